@@ -1,0 +1,175 @@
+"""Building switching graphs, and planning without building one."""
+
+from __future__ import annotations
+
+import time
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from regrasp_lp.errors import OptionError
+from regrasp_lp.friction import BoolArray, Cones
+from regrasp_lp.grasp_sets.collection import GraspSets
+from regrasp_lp.grasp_sets.vertices import Progress, build_family, kinds_of
+from regrasp_lp.handovers import decide_held
+from regrasp_lp.joins import best_joins
+from regrasp_lp.lp import Solver, get_solver
+from regrasp_lp.planning.hand import Hand
+from regrasp_lp.planning.on_demand import problem_on_demand
+from regrasp_lp.planning.plan import Plan
+from regrasp_lp.planning.planner import GraspLike, check_aligning, checked_grasp
+from regrasp_lp.polygon import Polygon
+from regrasp_lp.shadows import Shadows
+from regrasp_lp.switches import (
+    STORE_LIMIT,
+    StoredSwitches,
+    Switches,
+    SwitchesOnDemand,
+    SwitchRule,
+)
+from regrasp_lp.switching_graph import GraphOptions, SwitchingGraph
+
+
+def build_switching_graph(
+    polygon: Polygon,
+    friction: ArrayLike,
+    hand: Hand | None = None,
+    sets: str = "complete",
+    switching: str = "contact",
+    min_margin: float = 0.0,
+    solver: str = "clarabel",
+    presolve: bool = True,
+    progress: Progress | None = None,
+) -> SwitchingGraph:
+    """Compute all grasp sets of an object and the switches between them.
+
+    Parameters
+    ----------
+    polygon : Polygon
+    friction : float or sequence of float
+        μ, one value or one per edge.
+    hand : Hand, optional
+        Four fingers by default.
+    sets : {"complete", "chapter"}
+        All force-closure grasps of 2 and 3 contacts, or the chapter's two-finger, concurrent and
+        parallel sets.
+    switching : {"contact"}
+        Two sets are adjacent iff the same contacts can be held.
+    min_margin : float
+        Drop sets and switches whose best margin is not larger, in the object's unit.
+    solver : {"clarabel", "highs"}
+    presolve : bool
+        Decide by signs of torque functions and intervals (exact), and let the solver find margins
+        and witnesses; if False, decide everything by margin LPs.
+    progress : callable, optional
+        Called as ``progress(what, done, total)`` now and then.
+
+    Returns
+    -------
+    SwitchingGraph
+
+    Raises
+    ------
+    FrictionError, OptionError
+        If an argument has no meaning.
+    SolverError
+        If a solver left an LP open.
+
+    Examples
+    --------
+    >>> square = Polygon([(0, 0), (1, 0), (1, 1), (0, 1)], name="square")
+    >>> graph = build_switching_graph(square, friction=0.5)
+    >>> len(graph.sets), len(graph.components())
+    (10, 1)
+    """
+    kinds = kinds_of(sets)
+    backend = get_solver(solver)
+    hand = Hand() if hand is None else hand
+    if switching != "contact":
+        raise OptionError(f'switching must be "contact", got {switching!r}')
+    if not (np.isfinite(min_margin) and min_margin >= 0):
+        raise OptionError(f"min_margin must be a finite length >= 0, got {min_margin!r}")
+    seconds, started = {}, time.perf_counter()
+    cones = Cones.of(polygon, friction)
+    families = tuple(
+        build_family(
+            cones, kind, backend, presolve=presolve, min_margin=min_margin, progress=progress
+        )
+        for kind in kinds
+    )
+    grasp_sets = GraspSets(polygon, families)
+    seconds["sets"] = time.perf_counter() - started
+
+    started = time.perf_counter()
+    rule = switch_rule(grasp_sets, hand, backend, presolve=presolve, min_margin=min_margin)
+    switches: Switches
+    if rule.n_pairs > STORE_LIMIT:
+        switches = SwitchesOnDemand(rule)
+    else:
+        switches = StoredSwitches.of_pairs(len(grasp_sets), *rule.pairs(progress))
+    seconds["switches"] = time.perf_counter() - started
+    options = GraphOptions(sets, switching, float(min_margin), solver, presolve)
+    return SwitchingGraph(grasp_sets, switches, cones.friction, hand, options, seconds)
+
+
+def switch_rule(
+    sets: GraspSets, hand: Hand, solver: Solver, *, presolve: bool, min_margin: float
+) -> SwitchRule:
+    """Return the contact rule: decided exactly, or by the margin LPs of joined pieces."""
+
+    def decide(first: Shadows, second: Shadows) -> BoolArray:
+        if min_margin > 0:
+            return np.asarray(best_joins(first, second, solver).margins > min_margin)
+        if not presolve:
+            return best_joins(first, second, solver).exist
+        return decide_held(first, second, solver)
+
+    return SwitchRule(sets.sources, hand, decide)
+
+
+def plan_regrasp(
+    polygon: Polygon,
+    start: GraspLike,
+    goal: GraspLike,
+    friction: ArrayLike,
+    hand: Hand | None = None,
+    sets: str = "complete",
+    aligning: str = "slide",
+) -> Plan:
+    """Return a verified plan with the fewest placements from one grasp to another.
+
+    With complete sets and four fingers only the neighbourhoods of start and goal are looked at, so
+    that objects with hundreds of edges take no longer than small ones; otherwise, and to explain
+    why there is no plan, the whole graph is built.
+
+    Parameters
+    ----------
+    polygon : Polygon
+    start, goal : Grasp or iterable of (edge, position)
+    friction, hand, sets
+        As for `build_switching_graph`.
+    aligning : {"slide", "regrip"}
+
+    Returns
+    -------
+    Plan
+
+    Raises
+    ------
+    NoPlanFound, NotForceClosureError, ContactError, HandError, SolverError
+        As for `SwitchingGraph.plan`.
+    """
+    check_aligning(aligning)
+    hand = Hand() if hand is None else hand
+    cones = Cones.of(polygon, friction)
+    first, last = (
+        checked_grasp(polygon, grasp, cones.friction, hand, role)
+        for role, grasp in (("start", start), ("goal", goal))
+    )
+    if "three_finger" in kinds_of(sets) and hand == Hand(4):
+        problem = problem_on_demand(polygon, cones, get_solver("clarabel"), first, last)
+        plan = problem.plan(first, last, aligning) if problem is not None else None
+        if plan is not None:
+            return plan
+    graph = build_switching_graph(polygon, friction, hand, sets)
+    return graph.plan(start, goal, aligning)

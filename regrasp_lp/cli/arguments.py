@@ -1,0 +1,282 @@
+"""What the command line takes, and its help texts."""
+
+from __future__ import annotations
+
+import argparse
+import re
+from collections.abc import Callable, Sequence
+from typing import Any, NoReturn
+
+import regrasp_lp
+from regrasp_lp.cli import values
+from regrasp_lp.errors import OptionError
+
+PROGRAM = "regrasp-lp"
+
+_POINT_OPTIONS = ("--start-xy", "--goal-xy")
+
+_OVERVIEW = """\
+Plan how a hand of free-flying fingers regrasps a planar polygonal object, with
+the object in force closure at every instant.
+
+A contact is written edge:position: the number of an edge, and the distance from
+where that edge starts, in the object's unit. `show` draws the numbers."""
+
+_OVERVIEW_EXAMPLES = """\
+examples:
+  regrasp-lp show parts.geojson --name l_bracket
+  regrasp-lp plan parts.geojson --name l_bracket --friction 0.3
+  regrasp-lp graph parts.geojson --friction 0.2
+
+exit codes:
+  0  done
+  1  there is no plan, or the plan that was checked is faulty
+  2  an error: one line on standard error says what is wrong"""
+
+_PLAN = """\
+Find a plan with the fewest placements of fingers that leads from one grasp to
+another without ever letting go of the object, and print an account of it.
+
+Give start and goal as contacts (--start 4:0.3,0:1.2) or as points on the
+boundary (--start-xy "0.5,0 2,1.5"). What is not given is chosen far from the
+other in the switching graph, and printed in the form that the options take."""
+
+_PLAN_EXAMPLES = """\
+examples:
+  regrasp-lp plan parts.geojson --name hex_nut --friction 0.3
+  regrasp-lp plan parts.geojson --name rectangle --friction 0.4 \\
+      --start 0:30,2:30 --goal-xy "60,10 0,10" --json plan.json --plot plan.pdf
+  regrasp-lp plan parts.geojson --name wedge --friction 0.5,0.5,0.7 \\
+      --start 0:10,1:15,2:30 --goal 0:20,1:10,2:25
+
+exit codes:
+  0  a plan was found; it has passed an exact check
+  1  there is no plan: standard error says why
+  2  an error"""
+
+_GRAPH = """\
+Compute all grasp sets of an object and the switches between them, and print how
+many there are of each kind, how they hang together, and how long it took.
+Without --name all polygons of the file are taken, one after the other."""
+
+_GRAPH_EXAMPLES = """\
+examples:
+  regrasp-lp graph parts.geojson --friction 0.2
+  regrasp-lp graph parts.geojson --name hex_nut --friction 0.2 --sets chapter
+  regrasp-lp graph parts.geojson --name hex_nut --friction 0.2 --save hex_nut.npz"""
+
+_SHOW = """\
+Draw an object with the numbers of its edges, or list them. Edges are numbered
+counter-clockwise along the outline, from the first vertex (a small circle marks
+it), then clockwise along the holes. Drawing needs matplotlib, listing does not."""
+
+_SHOW_EXAMPLES = """\
+examples:
+  regrasp-lp show parts.geojson --name hex_nut
+  regrasp-lp show parts.geojson --name hex_nut --plot hex_nut.svg
+  regrasp-lp show parts.geojson --name hex_nut --list"""
+
+_CHECK = """\
+Verify a plan file, written by `plan --json` or by any other program. In exact
+rational arithmetic, and with no code of the planner, its steps are carried out
+one by one: the fingers that touch have to hold the object in force closure
+before and after each step and at every instant of a slide, no two fingers may
+meet, and the goal has to be reached."""
+
+_CHECK_EXAMPLES = """\
+examples:
+  regrasp-lp check plan.json
+
+exit codes:
+  0  the plan is good
+  1  the plan is faulty: its first fault is printed
+  2  an error: the file cannot be read, or is no plan"""
+
+
+class UsageError(OptionError):
+    """A command line that cannot be understood.
+
+    Attributes
+    ----------
+    program : str
+        Program and command whose help text would help.
+    """
+
+    def __init__(self, program: str, message: str) -> None:
+        super().__init__(message)
+        self.program = program
+
+
+class _Formatter(argparse.RawDescriptionHelpFormatter):
+    """Texts as written, and room for long options beside their explanations."""
+
+    def __init__(self, prog: str) -> None:
+        super().__init__(prog, max_help_position=26)
+
+
+class _Parser(argparse.ArgumentParser):
+    """Says what is wrong by an exception instead of printing its whole usage."""
+
+    def __init__(self, **kwargs: Any) -> None:
+        super().__init__(formatter_class=_Formatter, allow_abbrev=False, **kwargs)
+
+    def error(self, message: str) -> NoReturn:
+        raise UsageError(self.prog, message)
+
+
+def read_command_line(parser: argparse.ArgumentParser, arguments: Sequence[str]) -> Any:
+    """Return the options of a command line, as a namespace.
+
+    Raises
+    ------
+    UsageError
+        If it cannot be understood.
+    """
+    joined: list[str] = []
+    for argument in arguments:
+        # argparse would take a negative coordinate for another option
+        if joined and joined[-1] in _POINT_OPTIONS and re.match(r"-[\d.]", argument):
+            joined[-1] += f"={argument}"
+        else:
+            joined.append(argument)
+    return parser.parse_args(joined)
+
+
+def build_parser() -> argparse.ArgumentParser:
+    """Return the parser of the whole command line."""
+    # so late that a help text does not wait for what only the commands need
+    parser = _Parser(prog=PROGRAM, description=_OVERVIEW, epilog=_OVERVIEW_EXAMPLES)
+    version = f"{PROGRAM} {regrasp_lp.__version__}"
+    parser.add_argument("--version", action="version", version=version)
+    commands = parser.add_subparsers(
+        title="commands", dest="command", metavar="COMMAND", required=True
+    )
+
+    def command(name: str, brief: str, description: str, epilog: str) -> argparse.ArgumentParser:
+        added = commands.add_parser(name, help=brief, description=description, epilog=epilog)
+        added.set_defaults(run=_late(name))
+        return added
+
+    plan = command("plan", "plan from one grasp to another", _PLAN, _PLAN_EXAMPLES)
+    _add_object(plan, "needed if the file holds several")
+    _add_grasps(plan)
+    _add_model(plan)
+    plan.add_argument(
+        "--aligning",
+        choices=("slide", "regrip"),
+        default="slide",
+        help="how fingers move inside a grasp set: sliding along the edges (default), or by free "
+        "fingers taking over",
+    )
+    files = plan.add_argument_group("files to write")
+    _add_output(files, "--json", values.output_file, "the plan, for `check` and other programs")
+    _add_output(files, "--plot", values.picture_file, "a filmstrip of it: .png, .svg or .pdf")
+
+    graph = command("graph", "summarise all grasps and switches", _GRAPH, _GRAPH_EXAMPLES)
+    _add_object(graph, "all of them by default")
+    _add_model(graph)
+    graph.add_argument(
+        "--min-margin",
+        type=values.length,
+        default=0.0,
+        metavar="LENGTH",
+        help="drop grasp sets and switches whose best margin is not larger, in the object's unit "
+        "(default: 0)",
+    )
+    files = graph.add_argument_group("files to write")
+    _add_output(files, "--save", values.output_file, "the graph, for regrasp_lp.load_graph")
+
+    show = command("show", "draw an object with its edge numbers", _SHOW, _SHOW_EXAMPLES)
+    _add_object(show, "needed if the file holds several")
+    show.add_argument(
+        "-o",
+        "--plot",
+        type=values.picture_file,
+        metavar="OUT",
+        help="the picture to write: .png, .svg or .pdf (default: NAME.png in the current folder)",
+    )
+    show.add_argument(
+        "--list",
+        action="store_true",
+        help="print where each edge starts and ends, and its length; draw only with --plot",
+    )
+
+    check = command("check", "verify a plan file exactly", _CHECK, _CHECK_EXAMPLES)
+    check.add_argument("file", metavar="PLAN.json", help="the plan file")
+    return parser
+
+
+def _late(name: str) -> Callable[[argparse.Namespace], int]:
+    def run(options: argparse.Namespace) -> int:
+        from regrasp_lp.cli import commands
+
+        code: int = getattr(commands, name)(options)
+        return code
+
+    return run
+
+
+def _add_object(parser: argparse.ArgumentParser, which: str) -> None:
+    parser.add_argument("file", metavar="FILE", help="polygons, as GeoJSON or as WKT")
+    parser.add_argument("--name", help=f"the polygon to take; {which}")
+
+
+def _add_grasps(parser: argparse.ArgumentParser) -> None:
+    group = parser.add_argument_group("start and goal (2 or 3 contacts each)")
+    for role in ("start", "goal"):
+        either = group.add_mutually_exclusive_group()
+        either.add_argument(
+            f"--{role}",
+            type=values.grasp,
+            metavar="CONTACTS",
+            help="edge:position pairs separated by commas"
+            + ("; the first is finger 1" if role == "start" else ", reached by any fingers"),
+        )
+        either.add_argument(
+            f"--{role}-xy",
+            type=values.points,
+            metavar="POINTS",
+            help="x,y pairs separated by spaces or semicolons",
+        )
+    group.add_argument(
+        "--tolerance",
+        type=values.length,
+        metavar="LENGTH",
+        help="how far points may be from the boundary, in the object's unit; they are moved to "
+        "its nearest place (default: a thousandth of the diagonal of the object's bounding box)",
+    )
+
+
+def _add_model(parser: argparse.ArgumentParser) -> None:
+    group = parser.add_argument_group("friction, hand and grasps")
+    group.add_argument(
+        "--friction",
+        type=values.friction,
+        required=True,
+        metavar="MU",
+        help="coefficient of friction: one value, or one for each edge separated by commas",
+    )
+    group.add_argument(
+        "--fingers",
+        type=values.fingers,
+        default=4,
+        metavar="K",
+        help="fingers of the hand, 3 or more (default: 4)",
+    )
+    group.add_argument(
+        "--sets",
+        choices=("complete", "chapter"),
+        default="complete",
+        help="all force-closure grasps of 2 and 3 fingers (default), or the two-finger, "
+        "concurrent and parallel grasps only",
+    )
+    group.add_argument(
+        "--solver",
+        choices=("clarabel", "highs"),
+        default="clarabel",
+        help="solver of the linear programs (default: clarabel)",
+    )
+
+
+def _add_output(group: Any, option: str, reader: Callable[[str], Any], what: str) -> None:
+    group.add_argument(option, type=reader, metavar="OUT", help=what)

@@ -1,0 +1,305 @@
+"""The commands: each takes the options read from the command line and returns an exit code."""
+
+from __future__ import annotations
+
+import contextlib
+import difflib
+import io
+import re
+from argparse import Namespace
+from collections.abc import Callable, Iterator
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import regrasp_lp
+from regrasp_lp import Grasp, Hand, Plan, Polygon, SwitchingGraph
+from regrasp_lp.cli.far_apart import far_apart
+from regrasp_lp.cli.layout import fitted, table
+from regrasp_lp.cli.progress import ProgressBar
+from regrasp_lp.cli.values import PICTURES, grasp_text
+from regrasp_lp.errors import (
+    ContactError,
+    FileFormatError,
+    FrictionError,
+    NoPlanFound,
+    OptionError,
+    RegraspError,
+)
+from regrasp_lp.files import write_atomically
+from regrasp_lp.friction import FloatArray, per_edge_friction
+from regrasp_lp.planning.planner import checked_grasp
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
+_MOST_NAMES = 12  # listed in a message
+_SNAP = 1e-3  # of the diagonal of the object's bounding box: what a reader of a drawing can do
+_ROLES = ("start", "goal")
+
+
+def plan(options: Namespace) -> int:
+    """Plan from one grasp to another."""
+    _check_outputs(options.file, options.json, options.plot)
+    polygon = _one_polygon(options.file, options.name)
+    friction = per_edge_friction(options.friction, polygon.n_edges)
+    hand = Hand(options.fingers)
+    given: dict[str, Grasp | None] = {}
+    for role in _ROLES:
+        asked = _asked_grasp(polygon, role, options)
+        if asked is not None:
+            asked = checked_grasp(polygon, asked, friction, hand, role)
+        given[role] = asked
+    found = _found_plan(polygon, friction, hand, given, options)
+    print(fitted(str(found)))
+    print("It has passed an exact check.", flush=True)
+    if options.json:
+        with _writing(options.json):
+            found.to_json(options.json)
+    if options.plot:
+        _save_picture(found.plot, options.plot)
+    return 0
+
+
+def _found_plan(
+    polygon: Polygon,
+    friction: FloatArray,
+    hand: Hand,
+    given: dict[str, Grasp | None],
+    options: Namespace,
+) -> Plan:
+    start, goal = given["start"], given["goal"]
+    if start is not None and goal is not None and options.solver == "clarabel":
+        with ProgressBar() as bar:
+            bar("planning", 0, 0)
+            return regrasp_lp.plan_regrasp(
+                polygon, start, goal, friction, hand, sets=options.sets, aligning=options.aligning
+            )
+    with ProgressBar() as bar:
+        built = _built(polygon, friction, hand, options, bar)
+        bar("choosing grasps", 0, 0)
+        start, goal = _complete(built, given)
+    missing = [role for role in _ROLES if given[role] is None]
+    if missing:
+        print(_choice_text(missing, {"start": start, "goal": goal}))
+        print(flush=True)
+    with ProgressBar() as bar:
+        bar("planning", 0, 0)
+        return built.plan(start, goal, aligning=options.aligning)
+
+
+def _built(
+    polygon: Polygon, friction: FloatArray, hand: Hand, options: Namespace, bar: ProgressBar
+) -> SwitchingGraph:
+    return regrasp_lp.build_switching_graph(
+        polygon,
+        friction,
+        hand,
+        sets=options.sets,
+        min_margin=getattr(options, "min_margin", 0.0),
+        solver=options.solver,
+        progress=bar,
+    )
+
+
+def graph(options: Namespace) -> int:
+    """Print the summary of one or several graphs."""
+    _check_outputs(options.file, options.save)
+    polygons = _polygons(options.file, options.name)
+    if options.save and len(polygons) > 1:
+        raise OptionError(f"--save takes one graph, but {_several(options.file, polygons)}")
+    for number, polygon in enumerate(polygons):
+        try:
+            friction = per_edge_friction(options.friction, polygon.n_edges)
+        except FrictionError as error:
+            raise FrictionError(f"{polygon.name}: {error}") from error
+        with ProgressBar() as bar:
+            built = _built(polygon, friction, Hand(options.fingers), options, bar)
+            bar("counting", 0, 0)
+            summary = built.summary()
+        if number:
+            print()
+        print(summary, flush=True)
+        if options.save:
+            with _writing(options.save):
+                built.save(options.save)
+    return 0
+
+
+def show(options: Namespace) -> int:
+    """Draw an object with its edge numbers, or list them."""
+    _check_outputs(options.file, options.plot)
+    polygon = _one_polygon(options.file, options.name)
+    print(_description(polygon))
+    if options.list:
+        print()
+        print(_edge_table(polygon), flush=True)
+        if not options.plot:
+            return 0
+    path = options.plot or Path(_file_stem(polygon.name) + ".png")
+    _save_picture(lambda: polygon.plot().figure, path)
+    return 0
+
+
+def check(options: Namespace) -> int:
+    """Verify a plan file."""
+    try:
+        report = regrasp_lp.check_plan(options.file)
+    except RegraspError as error:
+        text = str(error)
+        where = "" if text.startswith(options.file) else f"{options.file}: "
+        raise FileFormatError(where + text) from error
+    except OSError as error:
+        reason = error.strerror or error
+        raise FileFormatError(f"{options.file}: cannot be read: {reason}") from error
+    counts = (
+        f"{_count(report.grasps_checked, 'grasp')} and {_count(report.slides_checked, 'slide')}"
+    )
+    if report.ok:
+        print(f"{options.file}: ok, {counts} checked exactly")
+        return 0
+    print(f"{options.file}: faulty, {report.fault} ({counts} before that passed)")
+    return 1
+
+
+# --- objects ------------------------------------------------------------------------------------
+
+
+def _polygons(file: str, name: str | None) -> list[Polygon]:
+    polygons = regrasp_lp.read_polygons(file)
+    if name is None:
+        return polygons
+    chosen = [polygon for polygon in polygons if polygon.name == name]
+    if chosen:
+        return chosen
+    names = [polygon.name for polygon in polygons]
+    folded = {one.casefold(): one for one in reversed(names)}
+    near = difflib.get_close_matches(name.casefold(), folded, n=5, cutoff=0.5)
+    close = [folded[one] for one in near]
+    listed = _listed([*close, *(one for one in names if one not in close)])
+    raise OptionError(f"{file} has no polygon named {name!r}; it has {listed}")
+
+
+def _one_polygon(file: str, name: str | None) -> Polygon:
+    polygons = _polygons(file, name)
+    if len(polygons) > 1:
+        raise OptionError(_several(file, polygons))
+    return polygons[0]
+
+
+def _several(file: str, polygons: list[Polygon]) -> str:
+    listed = _listed([polygon.name for polygon in polygons])
+    return f"{file} holds {len(polygons)} polygons: choose one with --name, of {listed}"
+
+
+def _listed(names: list[str]) -> str:
+    more = len(names) - _MOST_NAMES
+    return ", ".join(names[:_MOST_NAMES]) + (f" and {more} more" if more > 0 else "")
+
+
+def _description(polygon: Polygon) -> str:
+    width, height = polygon.bounds[2:] - polygon.bounds[:2]
+    holes = f", {_count(len(polygon.holes), 'hole')}" if polygon.holes else ""
+    return (
+        f"{polygon.name}: {polygon.n_edges} edges{holes}, {width:.4g} wide, {height:.4g} high, "
+        f"area {polygon.area:.4g}"
+    )
+
+
+def _edge_table(polygon: Polygon) -> str:
+    rows = [("edge", "from", "to", "length", "")]
+    for edge in range(polygon.n_edges):
+        start, end = (
+            f"({x:.6g}, {y:.6g})" for x, y in (polygon.edge_starts[edge], polygon.edge_ends[edge])
+        )
+        ring = int(polygon.ring_of_edge[edge])
+        where = f"hole {ring}" if ring else ""
+        rows.append((str(edge), start, end, f"{polygon.edge_lengths[edge]:.6g}", where))
+    return table(rows)
+
+
+# --- grasps -------------------------------------------------------------------------------------
+
+
+def _asked_grasp(polygon: Polygon, role: str, options: Namespace) -> Grasp | None:
+    contacts: Grasp | None = getattr(options, role)
+    points = getattr(options, f"{role}_xy")
+    if points is None:
+        return contacts
+    tolerance = _SNAP * polygon.diameter if options.tolerance is None else options.tolerance
+    try:
+        return polygon.snap(points, tolerance)
+    except ContactError as error:
+        raise ContactError(f"--{role}-xy: {error} (--tolerance changes it)") from error
+
+
+def _complete(graph: SwitchingGraph, given: dict[str, Grasp | None]) -> tuple[Grasp, Grasp]:
+    """Return start and goal; what is not given is chosen far from the other."""
+    for role in _ROLES:
+        one = given[role]
+        if one is not None and None in given.values() and not graph.locate(one):
+            raise NoPlanFound(
+                f"no plan exists among these sets: the {role} is in none of the {len(graph)}"
+            )
+    return far_apart(graph, given["start"], given["goal"])
+
+
+def _choice_text(missing: list[str], chosen: dict[str, Grasp]) -> str:
+    if len(missing) == 2:
+        head = "No start and no goal given; these two grasps are far apart in the graph:"
+    else:
+        other = "goal" if missing == ["start"] else "start"
+        head = f"No {missing[0]} given; this one is far from the {other} in the graph:"
+    width = max(len(role) for role in missing)
+    return "\n".join(
+        [head, *(f"  --{role:<{width}} {grasp_text(chosen[role], 15)}" for role in missing)]
+    )
+
+
+# --- files --------------------------------------------------------------------------------------
+
+
+def _check_outputs(source: str, *outputs: Path | None) -> None:
+    """Find out before any work whether the files can be written."""
+    paths = [path for path in outputs if path is not None]
+    for number, path in enumerate(paths):
+        if path.exists() and Path(source).exists() and path.samefile(source):
+            raise OptionError(f"{path} is the file that is read; write to another one")
+        if path.resolve() in [other.resolve() for other in paths[:number]]:
+            raise OptionError(f"{path} cannot be written twice")
+        if path.suffix.lower() in PICTURES:
+            import regrasp_lp.plotting  # noqa: F401  (says what to install if it cannot draw)
+
+
+@contextlib.contextmanager
+def _writing(path: Path) -> Iterator[None]:
+    """Say which file could not be written, or that it was."""
+    try:
+        yield
+    except OSError as error:
+        raise OptionError(f"{path}: cannot be written: {error.strerror or error}") from error
+    print(f"wrote {path}", flush=True)
+
+
+def _save_picture(draw: Callable[[], Figure], path: Path) -> None:
+    """Draw a picture and write it in one step; the same picture gives the same bytes."""
+    kind = path.suffix.lower().lstrip(".")
+    dates: dict[str, dict[str, Any]] = {"svg": {"Date": None}, "pdf": {"CreationDate": None}}
+    data = io.BytesIO()
+    with ProgressBar() as bar:
+        bar("drawing", 0, 0)
+        figure = draw()
+        import matplotlib
+
+        with matplotlib.rc_context({"svg.hashsalt": "regrasp_lp"}):
+            figure.savefig(data, format=kind, dpi=150, metadata=dates.get(kind))
+    with _writing(path):
+        write_atomically(path, data.getvalue())
+
+
+def _file_stem(name: str) -> str:
+    """Return a name of a file for an object, whatever the object is called."""
+    return re.sub(r"[^\w.-]+", "_", name).strip("._") or "polygon"
+
+
+def _count(number: int, noun: str) -> str:
+    return f"{number} {noun}{'s' * (number != 1)}"

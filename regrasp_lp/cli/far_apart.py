@@ -1,0 +1,95 @@
+"""Two grasps that are far apart in a switching graph, for who wants to see a plan."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+
+import numpy as np
+
+from regrasp_lp.cli.values import grasp, grasp_text
+from regrasp_lp.contact import Grasp
+from regrasp_lp.errors import ContactError, NoPlanFound
+from regrasp_lp.friction import IntArray
+from regrasp_lp.planning.search import placements_from
+from regrasp_lp.quality import margin
+from regrasp_lp.switching_graph import SwitchingGraph
+
+
+def far_apart(
+    graph: SwitchingGraph, start: Grasp | None = None, goal: Grasp | None = None
+) -> tuple[Grasp, Grasp]:
+    """Return a start and a goal between which a plan needs many placements.
+
+    What is given is kept. Otherwise they are good grasps of two sets: in the largest component
+    the set farthest from its first one, and the set farthest from that. Of equally far sets the
+    one with the largest margin is taken (to a millionth of the object's diameter), then the first.
+
+    Parameters
+    ----------
+    graph : SwitchingGraph
+    start, goal : Grasp, optional
+        Checked grasps that are in the graph.
+
+    Returns
+    -------
+    start, goal : Grasp
+        Chosen ones are at positions of few digits, which `grasp_text` gives exactly.
+
+    Raises
+    ------
+    NoPlanFound
+        If there are no two sets to choose from.
+    """
+    if start is not None and goal is not None:
+        return start, goal
+    if start is not None:
+        return start, _rounded(graph, _farthest(graph, graph.locate(start)))
+    if goal is not None:
+        # The way back places as many fingers, but for those that the two ends differ by.
+        fewer = graph.sets.contacts
+        return _rounded(graph, _farthest(graph, graph.locate(goal), fewer)), goal
+    components = graph.components()
+    if not components:
+        raise NoPlanFound("no plan exists: the object has no grasp set; friction may be too low")
+    if len(components[0]) == 1:
+        raise NoPlanFound(
+            "no two grasp sets are joined, so that none are far apart: give start and goal"
+        )
+    first = _farthest(graph, [min(components[0])])
+    return _rounded(graph, first), _rounded(graph, _farthest(graph, [first]))
+
+
+def _farthest(graph: SwitchingGraph, sources: Iterable[int], fewer: IntArray | None = None) -> int:
+    """Return the set that needs most placements from the sources, less `fewer` of each set."""
+    sets = graph.sets
+    found = placements_from(
+        sets.contacts, sets.margins, graph.switches, graph.hand, dict.fromkeys(sources, 0)
+    )
+    reached = np.flatnonzero(found >= 0)
+    far = found[reached] if fewer is None else (found - fewer)[reached]
+    margins = np.round(sets.margins[reached] / graph.polygon.diameter, 6)
+    return int(reached[np.lexsort((reached, -margins, -far))[0]])
+
+
+def _rounded(graph: SwitchingGraph, index: int) -> Grasp:
+    """Return a good grasp of a set at positions of few digits.
+
+    The best grasp is often at the ends of edges, where no error of place is tolerated: it is
+    moved off them if that keeps most of its margin.
+    """
+    polygon = graph.polygon
+    best = graph.sets.witness(index)
+    largest = margin(polygon, best, graph.friction)
+    for inset, kept in ((0.1, 0.9), (0.01, 0.9), (0.0, 0.999)):
+        fractions = best.fractions.clip(inset, 1 - inset)
+        pairs = list(zip(best.edges.tolist(), fractions.tolist(), strict=True))
+        moved = polygon.resolve(Grasp.at_fractions(pairs))
+        for digits in (4, 8, 12):
+            try:
+                rounded = polygon.resolve(grasp(grasp_text(moved, digits)))
+            except ContactError:  # rounded off the end of its edge
+                continue
+            enough = margin(polygon, rounded, graph.friction) >= kept * largest
+            if enough and index in graph.locate(rounded):
+                return rounded
+    return polygon.resolve(grasp(grasp_text(best)))

@@ -1,0 +1,105 @@
+"""A progress bar on a terminal for work that takes longer than a second."""
+
+from __future__ import annotations
+
+import os
+import shutil
+import sys
+import threading
+import time
+from types import TracebackType
+from typing import TextIO
+
+_REDRAW = 0.2  # seconds
+_WIDEST = 40  # characters of the bar itself
+
+
+class ProgressBar:
+    """Shows on standard error what is being done, if that is a terminal.
+
+    A context manager; inside it, call it as ``bar(what, done, total)`` or hand it to
+    `build_switching_graph` as `progress`. The bar appears once the work has taken `after` seconds
+    and is wiped away at the end. It is drawn by a thread of its own, so that it also shows during
+    long work that reports nothing.
+
+    Parameters
+    ----------
+    stream : text stream, optional
+        Standard error by default.
+    after : float, optional
+        In seconds.
+    """
+
+    def __init__(self, stream: TextIO | None = None, after: float = 1.0) -> None:
+        self._stream = sys.stderr if stream is None else stream
+        self._after = after
+        self._state = ("", 0, 0)
+        self._ended = threading.Event()
+        self._thread: threading.Thread | None = None
+        self._started = time.monotonic()
+
+    def __call__(self, what: str, done: int, total: int) -> None:
+        """Tell what is being done, and how much of it is; a total of 0 is an unknown one."""
+        self._state = (what.replace("_", "-"), done, total)
+
+    def __enter__(self) -> ProgressBar:
+        if _is_terminal(self._stream):
+            self._thread = threading.Thread(target=self._keep_drawing, daemon=True)
+            self._thread.start()
+        return self
+
+    def __exit__(
+        self,
+        kind: type[BaseException] | None,
+        error: BaseException | None,
+        trace: TracebackType | None,
+    ) -> None:
+        self._ended.set()
+        if self._thread is not None:
+            self._thread.join()
+
+    def _keep_drawing(self) -> None:
+        wait = self._after
+        width = 0
+        try:
+            while not self._ended.wait(wait):
+                line = self._line()
+                self._stream.write("\r" + line.ljust(width))
+                self._stream.flush()
+                wait, width = _REDRAW, len(line)
+            if width:
+                self._stream.write("\r" + " " * width + "\r")
+                self._stream.flush()
+        except (OSError, ValueError):
+            return  # the terminal is gone; the work goes on
+
+    def _line(self) -> str:
+        what, done, total = self._state
+        columns = _columns(self._stream)
+        elapsed = f"{time.monotonic() - self._started:.0f} s"
+        if total <= 0:
+            return f"{what}  {elapsed}"[: columns - 1]
+        part = min(max(done / total, 0.0), 1.0)
+        tail = f"  {100 * part:3.0f} %  {elapsed}"
+        room = min(columns - 1 - len(what) - len(tail) - 4, _WIDEST)
+        if room < 5:
+            return f"{what}{tail}"[: columns - 1]
+        full = round(part * room)
+        return f"{what}  [{'#' * full}{'.' * (room - full)}]{tail}"
+
+
+def _is_terminal(stream: TextIO | None) -> bool:
+    if stream is None or os.environ.get("TERM") == "dumb":
+        return False
+    try:
+        return stream.isatty()
+    except ValueError:  # closed
+        return False
+
+
+def _columns(stream: TextIO) -> int:
+    try:
+        columns = os.get_terminal_size(stream.fileno()).columns
+    except (OSError, ValueError):  # no terminal behind it after all
+        columns = 0
+    return columns or shutil.get_terminal_size().columns

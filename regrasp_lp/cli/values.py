@@ -1,0 +1,142 @@
+"""Values as they are written on the command line: contacts, points, friction, file names."""
+
+from __future__ import annotations
+
+import argparse
+import math
+import re
+from pathlib import Path
+
+from regrasp_lp.contact import Contact, Grasp
+
+PICTURES = (".png", ".svg", ".pdf")
+
+
+def grasp_text(grasp: Grasp, digits: int = 17) -> str:
+    """Return a grasp in the form that ``--start`` takes.
+
+    Examples
+    --------
+    >>> grasp_text(Grasp([(4, 0.25), (0, 1.2)]), digits=6)
+    '4:0.25,0:1.2'
+    """
+    return ",".join(f"{contact.edge}:{contact.position:.{digits}g}" for contact in grasp)
+
+
+def grasp(text: str) -> Grasp:
+    """Read contacts: pairs edge:position, separated by commas.
+
+    Examples
+    --------
+    >>> grasp("4:0.25, 0:1.2")
+    Grasp([(4, 0.25), (0, 1.2)])
+    """
+    return Grasp([_contact(pair.strip()) for pair in text.split(",")])
+
+
+def points(text: str) -> list[tuple[float, float]]:
+    """Read points: pairs x,y, separated by spaces or semicolons.
+
+    Examples
+    --------
+    >>> points("1,2 3,4.5"), points("-1, 2; 3, 4.5")
+    ([(1.0, 2.0), (3.0, 4.5)], [(-1.0, 2.0), (3.0, 4.5)])
+    """
+    pairs = re.sub(r"\s*,\s*", ",", text.replace(";", " ")).split()
+    if not pairs:
+        raise argparse.ArgumentTypeError('no point is given; write points as in "0.5,0 2,1.5"')
+    return [_point(pair) for pair in pairs]
+
+
+def friction(text: str) -> float | list[float]:
+    """Read friction: one value, or one for each edge separated by commas.
+
+    Examples
+    --------
+    >>> friction("0.2"), friction("0.2,0.3,0.2")
+    (0.2, [0.2, 0.3, 0.2])
+    """
+    values = []
+    for part in text.split(","):
+        value = _number(part)
+        if value is None or value <= 0:
+            raise argparse.ArgumentTypeError(
+                f"{part.strip()!r} is no friction coefficient; write one positive number, or one "
+                "for each edge as in 0.2,0.3,0.2"
+            )
+        values.append(value)
+    return values[0] if len(values) == 1 else values
+
+
+def fingers(text: str) -> int:
+    """Read the number of fingers, 3 or more."""
+    number = _whole(text)
+    if number is None or number < 3:
+        raise argparse.ArgumentTypeError(
+            f"{text!r} is no number of fingers to regrasp with; it takes at least 3"
+        )
+    return number
+
+
+def length(text: str) -> float:
+    """Read a length, 0 or more."""
+    value = _number(text)
+    if value is None or value < 0:
+        raise argparse.ArgumentTypeError(f"{text!r} is no length; write a number of 0 or more")
+    return value
+
+
+def output_file(text: str) -> Path:
+    """Read the name of a file to write: its folder has to exist."""
+    path = Path(text)
+    if not text or path.is_dir():
+        raise argparse.ArgumentTypeError(f"{text!r} is no name of a file")
+    if not path.parent.is_dir():
+        raise argparse.ArgumentTypeError(
+            f"cannot write {text!r}: there is no folder {str(path.parent)!r}"
+        )
+    return path
+
+
+def picture_file(text: str) -> Path:
+    """Read the name of a picture to write: its suffix says the format."""
+    path = output_file(text)
+    if path.suffix.lower() not in PICTURES:
+        raise argparse.ArgumentTypeError(
+            f"{text!r} has no suffix of a picture that can be written; use one of "
+            + ", ".join(PICTURES)
+        )
+    return path
+
+
+def _contact(pair: str) -> Contact:
+    edge_text, colon, position_text = pair.partition(":")
+    edge, position = _whole(edge_text), _number(position_text)
+    if not colon or edge is None or edge < 0 or position is None:
+        raise argparse.ArgumentTypeError(
+            f"{pair!r} is no contact; write contacts as edge:position separated by commas, as in "
+            "4:0.3,0:1.2"
+        )
+    return Contact(edge, position)
+
+
+def _point(pair: str) -> tuple[float, float]:
+    numbers = [_number(part) for part in pair.split(",")]
+    if len(numbers) != 2 or numbers[0] is None or numbers[1] is None:
+        raise argparse.ArgumentTypeError(
+            f"{pair!r} is no point; write points as x,y separated by spaces or semicolons, as in "
+            '"0.5,0 2,1.5"'
+        )
+    return numbers[0], numbers[1]
+
+
+def _whole(text: str) -> int | None:
+    return int(text) if re.fullmatch(r"\s*\d{1,18}\s*", text, re.ASCII) else None
+
+
+def _number(text: str) -> float | None:
+    """Return a finite number, or None; words and underscores that Python takes are none."""
+    if not re.fullmatch(r"\s*[+-]?(\d+\.?\d*|\.\d+)([eE][+-]?\d+)?\s*", text, re.ASCII):
+        return None
+    value = float(text)
+    return value if math.isfinite(value) else None

@@ -1,0 +1,169 @@
+"""A switching graph in one file.
+
+A ``.npz`` archive of numpy arrays (no pickle) with a JSON header: format "regrasp-graph",
+version 1. Torque functions are not stored but computed again from the edges of the sets.
+"""
+
+from __future__ import annotations
+
+import io
+import json
+import zipfile
+import zlib
+from dataclasses import asdict
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from regrasp_lp.build import switch_rule
+from regrasp_lp.errors import FileFormatError, RegraspError
+from regrasp_lp.files import write_atomically
+from regrasp_lp.friction import Cones
+from regrasp_lp.grasp_sets.collection import GraspSets
+from regrasp_lp.grasp_sets.families import parallel_functions
+from regrasp_lp.grasp_sets.vertices import Family, kinds_of
+from regrasp_lp.lp import get_solver
+from regrasp_lp.planning.hand import Hand
+from regrasp_lp.polygon import Polygon
+from regrasp_lp.switches import StoredSwitches, Switches, SwitchesOnDemand
+from regrasp_lp.switching_graph import GraphOptions, SwitchingGraph
+from regrasp_lp.torque import torque_functions
+
+FORMAT, VERSION = "regrasp-graph", 1
+
+# What numpy, zipfile, zlib and json raise on a file that is none, or not whole.
+_DAMAGED = (ValueError, KeyError, EOFError, zipfile.BadZipFile, zlib.error, AttributeError)
+
+
+def save_graph(graph: SwitchingGraph, path: str | Path) -> None:
+    """Write a graph to one file, whole or not at all.
+
+    Parameters
+    ----------
+    graph : SwitchingGraph
+    path : path-like
+    """
+    polygon = graph.polygon
+    header = {
+        "format": FORMAT,
+        "version": VERSION,
+        "name": polygon.name,
+        "hand": {"fingers": graph.hand.fingers},
+        "options": asdict(graph.options),
+        "seconds": graph.seconds,
+        "candidates": [family.n_candidates for family in graph.sets.families],
+    }
+    arrays: dict[str, np.ndarray] = {
+        "header": np.frombuffer(json.dumps(header).encode(), dtype=np.uint8),
+        "ring_sizes": np.array([len(ring) for ring in polygon.rings]),
+        "vertices": polygon.vertices,
+        "friction": graph.friction,
+    }
+    for family in graph.sets.families:
+        arrays[f"{family.kind}.edges"] = family.functions.edges
+        arrays[f"{family.kind}.centers"] = family.centers
+        arrays[f"{family.kind}.margins"] = family.margins
+        arrays[f"{family.kind}.witnesses"] = family.witnesses
+    if isinstance(graph.switches, StoredSwitches):
+        arrays["switches.starts"] = graph.switches.starts
+        arrays["switches.others"] = graph.switches.others
+        arrays["switches.held"] = graph.switches.held
+    buffer = io.BytesIO()
+    np.savez_compressed(buffer, **arrays)  # type: ignore[arg-type]
+    write_atomically(path, buffer.getvalue())
+
+
+def load_graph(path: str | Path) -> SwitchingGraph:
+    """Read a graph that `SwitchingGraph.save` wrote.
+
+    Parameters
+    ----------
+    path : path-like
+
+    Returns
+    -------
+    SwitchingGraph
+        Equal to the one that was saved.
+
+    Raises
+    ------
+    FileFormatError
+        If the file cannot be read, is damaged, of another format or of another version.
+    """
+    try:
+        with np.load(path, allow_pickle=False) as archive:
+            arrays = {name: archive[name] for name in archive.files}
+        header = json.loads(arrays["header"].tobytes())
+    except OSError as error:
+        raise FileFormatError(f"{path}: cannot be read: {error}") from error
+    except _DAMAGED as error:
+        raise FileFormatError(f"{path}: not a graph file, or damaged: {error}") from error
+    if not isinstance(header, dict) or header.get("format") != FORMAT:
+        raise FileFormatError(f"{path}: not a graph file: its header does not say {FORMAT!r}")
+    if header.get("version") != VERSION:
+        raise FileFormatError(
+            f"{path}: version {header.get('version')!r} of the format; this release reads "
+            f"version {VERSION}: build the graph again"
+        )
+    try:
+        return _graph(header, arrays)
+    except (KeyError, ValueError, TypeError, IndexError, RegraspError) as error:
+        raise FileFormatError(f"{path}: damaged: {error!r}") from error
+
+
+def _graph(header: dict[str, Any], arrays: dict[str, np.ndarray]) -> SwitchingGraph:
+    rings = np.split(arrays["vertices"], np.cumsum(arrays["ring_sizes"])[:-1])
+    polygon = Polygon(rings[0], rings[1:], header["name"])
+    cones = Cones.of(polygon, arrays["friction"])
+    options = GraphOptions(**header["options"])
+    families = tuple(
+        _family(cones, kind, count, arrays)
+        for kind, count in zip(kinds_of(options.sets), header["candidates"], strict=True)
+    )
+    sets = GraspSets(polygon, families)
+    hand = Hand(header["hand"]["fingers"])
+    switches: Switches
+    if "switches.starts" in arrays:
+        switches = _stored(
+            len(sets), *(arrays[f"switches.{n}"] for n in ("starts", "others", "held"))
+        )
+    else:
+        rule = switch_rule(
+            sets,
+            hand,
+            get_solver(options.solver),
+            presolve=options.presolve,
+            min_margin=options.min_margin,
+        )
+        switches = SwitchesOnDemand(rule)
+    return SwitchingGraph(sets, switches, cones.friction, hand, options, header["seconds"])
+
+
+def _family(cones: Cones, kind: str, candidates: int, arrays: dict[str, np.ndarray]) -> Family:
+    edges, centers, margins, witnesses = (
+        arrays[f"{kind}.{name}"] for name in ("edges", "centers", "margins", "witnesses")
+    )
+    m = 2 if kind == "two_finger" else 3
+    if not (
+        edges.shape == witnesses.shape == (len(edges), m)
+        and centers.shape == margins.shape == (len(edges),)
+        and ((edges >= 0) & (edges < cones.n_edges)).all()
+    ):
+        raise ValueError(f"the arrays of the {kind} sets do not fit together")
+    if kind == "parallel":
+        functions = parallel_functions(cones, edges, centers)
+    else:
+        functions = torque_functions(cones, edges)
+    return Family(kind, functions, centers, margins, witnesses, int(candidates))
+
+
+def _stored(n: int, starts: np.ndarray, others: np.ndarray, held: np.ndarray) -> StoredSwitches:
+    if not (
+        starts.shape == (n + 1,)
+        and others.shape == held.shape == (int(starts[-1]),)
+        and (np.diff(starts) >= 0).all()
+        and ((others >= 0) & (others < n)).all()
+    ):
+        raise ValueError("the arrays of the switches do not fit together")
+    return StoredSwitches(starts, others, held)

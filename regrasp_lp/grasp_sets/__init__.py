@@ -1,0 +1,1 @@
+"""Grasp sets: which combinations of edges hold the object, and where."""

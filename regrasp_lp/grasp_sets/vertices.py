@@ -1,0 +1,243 @@
+"""Vertices of the switching graph: the existing grasp sets, each with margin and witness."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from fractions import Fraction
+from itertools import permutations
+
+import numpy as np
+
+from regrasp_lp.errors import OptionError
+from regrasp_lp.friction import BoolArray, Cones, FloatArray, IntArray
+from regrasp_lp.grasp_sets.candidates import (
+    complete_candidates,
+    concurrent_candidates,
+    parallel_candidates,
+    two_finger_candidates,
+)
+from regrasp_lp.grasp_sets.families import parallel_functions
+from regrasp_lp.grasp_sets.pieces import piece_sets
+from regrasp_lp.lp import MarginSolutions, Solver, maximise_margins
+from regrasp_lp.margins import best_pieces
+from regrasp_lp.torque import TorqueFunctions, torque_functions
+
+Progress = Callable[[str, int, int], None]
+
+_APART = 1e-6  # of an edge: contacts of a witness are not closer than half of it
+
+
+@dataclass(frozen=True, eq=False)
+class Family:
+    """All existing grasp sets of one kind, stacked.
+
+    Parameters
+    ----------
+    kind : str
+        "two_finger", "three_finger", "concurrent" or "parallel".
+    functions : TorqueFunctions
+        One combination a set.
+    centers : numpy.ndarray of int, shape (N,)
+        Centre edge of parallel sets; -1 elsewhere.
+    margins : numpy.ndarray, shape (N,)
+        Largest margin of a grasp in the set, in the object's unit.
+    witnesses : numpy.ndarray, shape (N, m)
+        Fractions of a grasp strictly inside that attains it.
+    n_candidates : int
+        Number of combinations that were considered.
+    """
+
+    kind: str
+    functions: TorqueFunctions
+    centers: IntArray
+    margins: FloatArray
+    witnesses: FloatArray
+    n_candidates: int
+
+    def __len__(self) -> int:
+        return len(self.functions)
+
+
+def candidate_functions(cones: Cones, kind: str) -> tuple[TorqueFunctions, IntArray]:
+    """Return the torque functions and centres of all candidates of one kind."""
+    if kind == "parallel":
+        edges, centers = parallel_candidates(cones)
+        return parallel_functions(cones, edges, centers), centers
+    if kind == "concurrent":
+        edges = concurrent_candidates(cones)
+    elif kind == "three_finger":
+        edges = complete_candidates(cones, 3)
+    else:
+        edges = two_finger_candidates(cones)
+    return torque_functions(cones, edges), np.full(len(edges), -1)
+
+
+def kinds_of(sets: str) -> tuple[str, ...]:
+    """Return the kinds of grasp sets that `sets` ("complete" or "chapter") consists of.
+
+    Raises
+    ------
+    OptionError
+        If there is no such choice.
+    """
+    if sets == "complete":
+        return "two_finger", "three_finger"
+    if sets == "chapter":
+        return "two_finger", "concurrent", "parallel"
+    raise OptionError(f'sets must be "complete" or "chapter", got {sets!r}')
+
+
+def build_family(
+    cones: Cones,
+    kind: str,
+    solver: Solver,
+    *,
+    presolve: bool = True,
+    min_margin: float = 0.0,
+    progress: Progress | None = None,
+) -> Family:
+    """Return all existing grasp sets of one kind.
+
+    With `presolve` the signs of torque functions at two corners decide which sets exist, a closed
+    form says which piece of each is best, and the solver maximises the margin there. Without it
+    the solver maximises the margin of every piece of every candidate.
+
+    Parameters
+    ----------
+    cones : Cones
+    kind : str
+    solver : Solver
+    presolve : bool
+    min_margin : float
+        Sets whose margin is not larger are dropped.
+    progress : callable, optional
+        Called with what is being done, how many LPs are done, and how many there are.
+
+    Returns
+    -------
+    Family
+
+    Raises
+    ------
+    SolverError
+        If the solver leaves an LP open.
+    """
+    functions, centers = candidate_functions(cones, kind)
+    return solve_family(
+        kind,
+        functions,
+        centers,
+        solver,
+        presolve=presolve,
+        min_margin=min_margin,
+        progress=progress,
+    )
+
+
+def solve_family(
+    kind: str,
+    functions: TorqueFunctions,
+    centers: IntArray,
+    solver: Solver,
+    *,
+    presolve: bool = True,
+    min_margin: float = 0.0,
+    progress: Progress | None = None,
+) -> Family:
+    """Return the existing sets among given candidates; as `build_family`, which see."""
+    n_candidates = len(functions)
+    kept = np.flatnonzero(functions.exists() if presolve else functions.spans)
+    functions, centers = functions.take(kept), centers[kept]
+    if presolve:
+        chosen = np.column_stack((np.arange(len(functions)), best_pieces(functions)[1]))
+    else:
+        chosen = _all_pieces(functions)
+
+    def tell(done: int) -> None:
+        if progress is not None:
+            progress(f"{kind} margins", done, len(chosen))
+
+    names = [f"f{i}" for i in range(functions.m)]
+    solutions = maximise_margins(piece_sets(functions, chosen, names), solver, tell)
+    margins, witnesses, exists = _best_of_each(len(functions), functions.m, chosen, solutions)
+    if presolve:
+        exists = np.ones(len(functions), dtype=bool)
+    witnesses = _off_corners(functions, _inside(functions, _spread(functions, witnesses)))
+    exists &= margins > min_margin if min_margin > 0 else True
+    kept = np.flatnonzero(exists)
+    return Family(
+        kind, functions.take(kept), centers[kept], margins[kept], witnesses[kept], n_candidates
+    )
+
+
+def _all_pieces(functions: TorqueFunctions) -> IntArray:
+    valid = functions.valid
+    different = ~np.eye(valid.shape[1], dtype=bool)
+    return np.argwhere(valid[:, :, None] & valid[:, None, :] & different)
+
+
+def _best_of_each(
+    n: int, m: int, pieces: IntArray, solutions: MarginSolutions
+) -> tuple[FloatArray, FloatArray, BoolArray]:
+    """The best solution among the pieces of each set: margin, point and whether positive."""
+    margins, points = np.full(n, -np.inf), np.full((n, m), 0.5)
+    positive = np.zeros(n, dtype=bool)
+    order = np.lexsort((-solutions.margins, pieces[:, 0]))
+    rows, first = np.unique(pieces[order, 0], return_index=True)
+    best = order[first]
+    margins[rows], points[rows] = solutions.margins[best], solutions.points[best]
+    positive[rows] = solutions.positive[best]
+    return margins, points, positive
+
+
+def _spread(functions: TorqueFunctions, witnesses: FloatArray) -> FloatArray:
+    """Order two contacts on one edge, and move them apart where they coincide.
+
+    Where they coincide the grasp is that of two contacts. Its best functions have all their
+    forces on the edge at either contact, so that moving the first back and the second forth
+    takes nothing from the margin.
+    """
+    witnesses = witnesses.copy()
+    for i in range(functions.m - 1):
+        same = functions.edges[:, i] == functions.edges[:, i + 1]
+        pair = np.sort(witnesses[same, i : i + 2], axis=1)
+        close = pair[:, 1] - pair[:, 0] < _APART
+        pair[close] = [0.0, 1.0]
+        witnesses[same, i : i + 2] = pair
+    return witnesses
+
+
+def _inside(functions: TorqueFunctions, witnesses: FloatArray) -> FloatArray:
+    """Replace witnesses that are not strictly inside, exactly, by one on the diagonal.
+
+    These are of sets thinner than the solver's accuracy. A set thinner than the doubles may keep
+    a witness that is not inside: it exists, but no grasp in it can be written down.
+    """
+    witnesses = np.where(witnesses < 1e-12, 0.0, np.where(witnesses > 1 - 1e-12, 1.0, witnesses))
+    for row in np.flatnonzero(~functions.contain(witnesses)).tolist():
+        witnesses[row] = _diagonal_middle(functions, row)
+    return _spread(functions, witnesses)
+
+
+def _diagonal_middle(functions: TorqueFunctions, row: int) -> float:
+    """The middle of the part of the diagonal from 0 to l that is in a set, in rationals."""
+    lines = [(c, sum(slopes)) for c, slopes in zip(*functions.exact_coefficients(row), strict=True)]
+    roots = [-constant / rise for constant, rise in lines]
+    return float((max(min(roots), Fraction(0)) + min(max(roots), Fraction(1))) / 2)
+
+
+def _off_corners(functions: TorqueFunctions, witnesses: FloatArray) -> FloatArray:
+    """Move one of two contacts that meet at a corner of the object along its edge.
+
+    No function rises by more than its slope, so that a step of half the margin over the largest
+    slope stays inside.
+    """
+    cones, edges, moved = functions.cones, functions.edges, witnesses.copy()
+    for i, j in permutations(range(functions.m), 2):
+        corner = (cones.ends[edges[:, i]] == cones.starts[edges[:, j]]).all(axis=1)
+        meet = corner & ((1 - moved[:, i]) + moved[:, j] < _APART / 2)
+        rise = functions.slopes[:, :, j].max(axis=1, initial=0.0)
+        free = np.divide(functions.margins(moved), 2 * rise, out=np.ones(len(rise)), where=rise > 0)
+        moved[meet, j] += np.clip(free, 0.0, _APART / 2)[meet]
+    return np.where(functions.contain(moved)[:, None], moved, witnesses)

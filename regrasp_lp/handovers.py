@@ -1,0 +1,103 @@
+"""Every way to switch between two grasp sets: which contacts are held, from where to where."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from regrasp_lp.friction import BoolArray, FloatArray, IntArray
+from regrasp_lp.grasp_sets.collection import GraspSets
+from regrasp_lp.joins import best_joins
+from regrasp_lp.lp import Solver
+from regrasp_lp.shadows import Shadows, shadows
+from regrasp_lp.switching import can_switch
+
+
+@dataclass(frozen=True, eq=False)
+class Handover:
+    """One way to switch from one set to another, with the best grasps for it.
+
+    Parameters
+    ----------
+    slots : tuple of (int, int)
+        Each held contact as its place in the first and in the second set; contacts of a set are
+        in ascending order of their edges, two on one edge in their order along it.
+    margin : float
+        The largest margin that both grasps can have at once.
+    first, second : numpy.ndarray, shape (m,)
+        Fractions of such grasps, equal in the held contacts.
+    """
+
+    slots: tuple[tuple[int, int], ...]
+    margin: float
+    first: FloatArray
+    second: FloatArray
+
+    @property
+    def held(self) -> int:
+        """Number of held contacts."""
+        return len(self.slots)
+
+
+def handovers(
+    sets: GraspSets, solver: Solver, first: int, second: int, held: int
+) -> list[Handover]:
+    """Return every feasible way to switch between two sets that holds so many contacts.
+
+    Parameters
+    ----------
+    sets : GraspSets
+    solver : Solver
+        Finds margins and witnesses; what is feasible is decided exactly (with three held
+        contacts: by the margin LP).
+    first, second : int
+        Numbers of the two sets.
+    held : int
+        0 to 3.
+
+    Returns
+    -------
+    list of Handover
+        The largest margin first.
+    """
+    if held == 0:
+        margin = float(min(sets.margins[first], sets.margins[second]))
+        return [Handover((), margin, *(_witness(sets, i) for i in (first, second)))]
+    one, other = (_projections(sets, index, held) for index in (first, second))
+    if not (len(one) and len(other)):
+        return []
+    i, j = np.nonzero((one.edges[:, None, :] == other.edges[None, :, :]).all(axis=2))
+    one, other = one.take(i), other.take(j)
+    joins = best_joins(one, other, solver, apart=True)
+    feasible = decide_held(one, other, solver)
+    found = [
+        Handover(
+            tuple(zip(one.slots[n].tolist(), other.slots[n].tolist(), strict=True)),
+            float(joins.margins[n]),
+            joins.first[n, : one.sources[one.source[n]].m],
+            joins.second[n, : other.sources[other.source[n]].m],
+        )
+        for n in np.flatnonzero(feasible & np.isfinite(joins.margins))
+    ]
+    return sorted(found, key=lambda h: (-h.margin, h.slots))
+
+
+def decide_held(first: Shadows, second: Shadows, solver: Solver) -> BoolArray:
+    """Whether aligned projections have a common point: exactly, or by LP if three are held."""
+    if first.held < 3:
+        return can_switch(first, second)
+    return best_joins(first, second, solver).exist
+
+
+def _projections(sets: GraspSets, index: int, held: int) -> Shadows:
+    family, row = sets.place(index)
+    none: IntArray = np.zeros(0, dtype=np.intp)
+    rows = [np.array([row]) if f == family else none for f in range(len(sets.families))]
+    return shadows(sets.sources, held, rows, ordered=True)
+
+
+def _witness(sets: GraspSets, index: int) -> FloatArray:
+    family, row = sets.place(index)
+    witness: FloatArray = sets.families[family].witnesses[row]
+    return witness

@@ -1,0 +1,11 @@
+"""Margin linear programs, in stacks: two solvers behind one function.
+
+A margin LP is ``max ε  s.t.  rows x + scales ε <= bounds, lower <= x <= upper``: always feasible
+and, with a positive scale, always bounded. No solver is ever asked whether something is feasible,
+and none is believed: an answer is its point and its multipliers, from which a lower and an upper
+bound of the optimum are computed here (`margin_lp.enclose`).
+"""
+
+from regrasp_lp.lp.margin_lp import MarginSolutions, Solver, get_solver, maximise_margins
+
+__all__ = ["MarginSolutions", "Solver", "get_solver", "maximise_margins"]

@@ -1,0 +1,1 @@
+"""Planning: search, the path LP, aligning, plans and their verification."""

@@ -1,0 +1,128 @@
+"""From grasps along a path to the steps of numbered fingers."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+from regrasp_lp.contact import Contact, Grasp
+from regrasp_lp.errors import NoPlanFound
+from regrasp_lp.friction import FloatArray
+from regrasp_lp.grasp_sets.collection import GraspSets
+from regrasp_lp.planning.hand import Hand
+from regrasp_lp.planning.plan import Support
+from regrasp_lp.planning.steps import Place, Release, Slide, Step
+
+
+class Execution:
+    """Keeps track of the fingers while steps are written down.
+
+    Parameters
+    ----------
+    sets : GraspSets
+    hand : Hand
+    start : dict of int to Contact
+        The touching fingers.
+    fingers : sequence of int
+        The finger of each contact of the first set, in the set's order.
+    index : int
+        The first set.
+    """
+
+    def __init__(
+        self,
+        sets: GraspSets,
+        hand: Hand,
+        start: dict[int, Contact],
+        fingers: Sequence[int],
+        index: int,
+    ) -> None:
+        self._sets, self._hand = sets, hand
+        self._touching = dict(start)
+        self._fingers = list(fingers)
+        self._index = index
+        self.steps: list[Step] = []
+        self.supports: list[Support] = [self._support()]
+
+    def _support(self) -> Support:
+        grasp_set = self._sets[self._index]
+        return Support(grasp_set.kind, tuple(sorted(self._fingers)), grasp_set.center)
+
+    def _do(self, step: Step) -> None:
+        match step:
+            case Place(finger, contact):
+                self._touching[finger] = contact
+            case Release(finger):
+                del self._touching[finger]
+            case Slide(moves):
+                self._touching.update(moves)
+        self.steps.append(step)
+        self.supports.append(self._support())
+
+    def _contact(self, slot: int, fraction: float) -> Contact:
+        edge = self._touching[self._fingers[slot]].edge
+        return self._sets.polygon.resolve_contact(Contact.at_fraction(edge, fraction))
+
+    def _free_finger(self) -> int:
+        return next(k for k in range(1, self._hand.fingers + 1) if k not in self._touching)
+
+    def release_others(self) -> None:
+        """Release every finger that is not part of the current set's grasp."""
+        for finger in sorted(set(self._touching) - set(self._fingers)):
+            self._do(Release(finger))
+
+    def slide(self, fractions: FloatArray) -> None:
+        """Slide to another grasp of the current set."""
+        moves = {}
+        for slot, fraction in enumerate(fractions.tolist()):
+            contact = self._contact(slot, fraction)
+            if contact != self._touching[self._fingers[slot]]:
+                moves[self._fingers[slot]] = contact
+        if moves:
+            self._do(Slide(moves))
+
+    def regrip(self, slot: int, fraction: float) -> None:
+        """Move one contact by placing a free finger there and releasing the old one.
+
+        Raises
+        ------
+        NoPlanFound
+            If the hand has no free finger.
+        """
+        if len(self._touching) == self._hand.fingers:
+            raise NoPlanFound(
+                f"aligning by repositioning needs a free finger, but all {self._hand.fingers} "
+                f"hold the object on edges {list(self._sets[self._index].edges)}: use "
+                'aligning="slide", or a hand with one more finger'
+            )
+        old, new = self._fingers[slot], self._free_finger()
+        contact = self._contact(slot, fraction)
+        if contact == self._touching[old]:
+            return
+        self._do(Place(new, contact))
+        self._fingers[slot] = new
+        self._do(Release(old))
+
+    def switch(self, index: int, held: Sequence[tuple[int, int]], fractions: FloatArray) -> None:
+        """Switch to another set: place its contacts that are not held, then release the others."""
+        grasp_set = self._sets[index]
+        fingers = [0] * len(grasp_set.edges)
+        for here, there in held:
+            fingers[there] = self._fingers[here]
+        new = [slot for slot, finger in enumerate(fingers) if finger == 0]
+        leaving = sorted(set(self._fingers) - set(fingers))
+        for slot in new:
+            fingers[slot] = self._free_finger()
+            contact = Contact.at_fraction(grasp_set.edges[slot], float(fractions[slot]))
+            if slot == new[-1] and not leaving:
+                self._fingers, self._index = fingers, index
+            self._do(Place(fingers[slot], self._sets.polygon.resolve_contact(contact)))
+        self._fingers, self._index = fingers, index
+        for finger in leaving:
+            self._do(Release(finger))
+
+    def place_others(self, goal: Grasp) -> None:
+        """Place the contacts of the goal that are not part of the last set's grasp."""
+        there = set(self._touching.values())
+        for contact in goal:
+            if contact not in there:
+                self._do(Place(self._free_finger(), contact))

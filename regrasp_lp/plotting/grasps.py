@@ -1,0 +1,403 @@
+"""A grasp: numbered fingers, friction cones, the line of a two-finger grasp."""
+
+from __future__ import annotations
+
+from collections.abc import Collection, Iterable, Mapping
+from dataclasses import dataclass
+from types import MappingProxyType
+from typing import Any, TypeAlias
+
+import numpy as np
+import numpy.typing as npt
+from matplotlib.axes import Axes
+from matplotlib.lines import Line2D
+from matplotlib.patches import FancyArrowPatch
+from matplotlib.patches import Polygon as Wedge
+from matplotlib.text import Text
+
+from regrasp_lp.contact import Contact, Grasp
+from regrasp_lp.errors import OptionError
+from regrasp_lp.friction import FloatArray, per_edge_friction
+from regrasp_lp.plotting import palette
+from regrasp_lp.plotting.frame import Drawing, Frame, shifted
+from regrasp_lp.plotting.outline import PolygonArtists, number_edges, paper_of, plot_polygon
+from regrasp_lp.plotting.placement import Label, Placed, Search, place
+from regrasp_lp.polygon import Polygon
+
+Contacts: TypeAlias = Mapping[int, Contact] | Grasp | Iterable[Contact | tuple[int, float]]
+
+_ARROW_SHIFT = 4.5  # points from an edge to the arrow of a slide along it
+_ARROW_LEAST = 11.0  # length of the shortest arrow, in points
+_TURNS = (0, 20, -20, 40, -40, 60, -60, 80, -80, 110, -110, 145, -145)
+_SEARCH = Search(palette.FINGER_GAP, (0, 5, 11, 18, 27, 38), _TURNS, sweeps=3)
+
+
+@dataclass(frozen=True, eq=False)
+class FingerArtists:
+    """How one finger is drawn.
+
+    Parameters
+    ----------
+    contact : matplotlib.lines.Line2D
+        A dot at the exact contact.
+    leader : matplotlib.lines.Line2D
+        From the contact to the circle.
+    circle : matplotlib.lines.Line2D
+        The finger, beside the object.
+    number : matplotlib.text.Text
+        Its number, in the circle.
+    """
+
+    contact: Line2D
+    leader: Line2D
+    circle: Line2D
+    number: Text
+
+
+@dataclass(frozen=True, eq=False)
+class GraspArtists(Drawing):
+    """What `plot_grasp` drew.
+
+    Parameters
+    ----------
+    polygon : PolygonArtists
+        The object.
+    fingers, released : mapping of int to FingerArtists
+        The touching fingers, and the ghosts of released ones.
+    cones : mapping of int to matplotlib.patches.Polygon
+        Friction cone of each supporting finger of three or more, within the object.
+    line : matplotlib.lines.Line2D or None
+        Joins the contacts of two supporting fingers.
+    arrows : mapping of int to matplotlib.patches.FancyArrowPatch
+        From where a finger was to where it has slid.
+    """
+
+    polygon: PolygonArtists
+    fingers: Mapping[int, FingerArtists]
+    released: Mapping[int, FingerArtists]
+    cones: Mapping[int, Wedge]
+    line: Line2D | None
+    arrows: Mapping[int, FancyArrowPatch]
+
+
+def plot_grasp(
+    polygon: Polygon,
+    contacts: Contacts,
+    friction: npt.ArrayLike,
+    ax: Axes | None = None,
+    *,
+    cones: bool = True,
+    support: Collection[int] | None = None,
+    center: int | None = None,
+    highlight: Collection[int] = (),
+    released: Mapping[int, Contact] | None = None,
+    slid_from: Mapping[int, Contact] | None = None,
+    edge_numbers: bool = False,
+) -> GraspArtists:
+    """Draw an object and the fingers that touch it.
+
+    A finger is a numbered circle beside the object, joined to a dot at its contact: blue if it
+    supports the object, white if it only touches, vermillion with a dark ring if highlighted, grey
+    and hollow if just released. Three or more supporting fingers are drawn with their friction
+    cones, as far as these lie in the object; two are joined by a dashed line.
+
+    Parameters
+    ----------
+    polygon : Polygon
+    contacts : mapping of int to Contact, or Grasp
+        Where each finger is; the contacts of a grasp are those of fingers 1, 2, ...
+    friction : float or sequence of float
+        μ, one value or one per edge.
+    ax : matplotlib.axes.Axes, optional
+        Its limits and aspect are set. By default new axes of a new figure.
+    cones : bool, optional
+        Whether to draw cones, or the line of two fingers.
+    support : collection of int, optional
+        The fingers that hold the object; all by default.
+    center : int, optional
+        Centre edge of a parallel grasp: then the cones are the common cone of all contacts.
+    highlight : collection of int, optional
+        Fingers to stand out.
+    released : mapping of int to Contact, optional
+        Where released fingers were.
+    slid_from : mapping of int to Contact, optional
+        Where fingers were before they slid to where they are: drawn as arrows beside the edge,
+        at least 11 points long.
+    edge_numbers : bool, optional
+        Whether to number the edges.
+
+    Returns
+    -------
+    GraspArtists
+        With ``ax`` and ``figure``; a notebook shows it if the figure is new.
+
+    Raises
+    ------
+    ContactError, FrictionError
+        If a contact is not on the object, or friction is none.
+    OptionError
+        If `support`, `highlight` or `slid_from` name a finger that does not touch.
+
+    Examples
+    --------
+    >>> square = Polygon([(0, 0), (2, 0), (2, 2), (0, 2)])
+    >>> artists = plot_grasp(square, Grasp([(0, 1.0), (2, 1.0)]), friction=0.3)
+    >>> sorted(artists.fingers), artists.line is not None
+    ([1, 2], True)
+    """
+    mu = per_edge_friction(friction, polygon.n_edges)
+    now, gone = _resolved(polygon, contacts), _resolved(polygon, released or {})
+    before = _resolved(polygon, slid_from or {})
+    holding = tuple(now) if support is None else tuple(sorted(support))
+    for what, named in (("support", holding), ("highlight", highlight), ("slid_from", before)):
+        _check_touching(what, named, now)
+    drawn = plot_polygon(polygon, ax, edge_numbers=False)
+    frame = Frame.of(drawn.ax)
+    wedges, line = _draw_support(drawn, polygon, mu, {k: now[k] for k in holding if cones}, center)
+    moves = ((k, _draw_arrow(drawn.ax, polygon, frame, before[k], now[k])) for k in before)
+    arrows = {k: arrow for k, arrow in moves if arrow is not None}
+    avoid = [_at(polygon, c) for c in (*now.values(), *gone.values(), *before.values())]
+    if line is not None:
+        avoid += _points_along(line)
+    placed = _place_fingers(polygon, frame, [*now.values(), *gone.values()], avoid)
+    styles = [_style(k, holding, highlight) for k in now] + [_RELEASED] * len(gone)
+    fingers = [
+        _draw_finger(drawn.ax, frame, finger, at, style)
+        for finger, at, style in zip((*now, *gone), placed, styles, strict=True)
+    ]
+    if edge_numbers:
+        drawn = number_edges(drawn, polygon, frame, placed)
+    return GraspArtists(
+        drawn.ax,
+        drawn,
+        MappingProxyType(dict(zip(now, fingers, strict=False))),
+        MappingProxyType(dict(zip(gone, fingers[len(now) :], strict=True))),
+        MappingProxyType(wedges),
+        line,
+        MappingProxyType(arrows),
+    )
+
+
+def _resolved(polygon: Polygon, contacts: Contacts) -> dict[int, Contact]:
+    if not isinstance(contacts, Mapping):
+        contacts = dict(enumerate(Grasp(contacts), start=1))
+    return {k: polygon.resolve_contact(contacts[k]) for k in sorted(contacts)}
+
+
+def _check_touching(what: str, fingers: Collection[int], touching: Mapping[int, Contact]) -> None:
+    for finger in fingers:
+        if finger not in touching:
+            names = ", ".join(map(str, touching))
+            raise OptionError(f"{what} names finger {finger!r}, which does not touch: {names} do")
+
+
+def _at(polygon: Polygon, contact: Contact) -> FloatArray:
+    assert contact.fraction is not None
+    return polygon.points(contact.edge, contact.fraction)
+
+
+# --- what holds the object ----------------------------------------------------------------------
+
+
+def _cone_angles(
+    polygon: Polygon, mu: FloatArray, holding: Mapping[int, Contact], center: int | None
+) -> dict[int, tuple[float, float]]:
+    """First and last direction of each finger's cone, in radians."""
+    direction = np.arctan2(polygon.normals[:, 1], polygon.normals[:, 0])
+    half = np.arctan(mu)
+    whole = {
+        k: (float(direction[c.edge] - half[c.edge]), float(direction[c.edge] + half[c.edge]))
+        for k, c in holding.items()
+    }
+    opposite = {k: np.pi if c.edge == center else 0.0 for k, c in holding.items()}
+    if center is None or not any(opposite.values()):
+        return whole
+    # all cones as seen from the contacts that are not on the centre edge, near one direction
+    reference = next(float(direction[c.edge]) for k, c in holding.items() if not opposite[k])
+    low, high = -np.inf, np.inf
+    for k, (first, last) in whole.items():
+        middle = (first + last) / 2 + opposite[k] - reference
+        apart = (middle + np.pi) % (2 * np.pi) - np.pi
+        low, high = max(low, apart - (last - first) / 2), min(high, apart + (last - first) / 2)
+    if low >= high:
+        return whole
+    return {k: (reference + low + turn, reference + high + turn) for k, turn in opposite.items()}
+
+
+def _draw_support(
+    drawn: PolygonArtists,
+    polygon: Polygon,
+    mu: FloatArray,
+    holding: Mapping[int, Contact],
+    center: int | None,
+) -> tuple[dict[int, Wedge], Line2D | None]:
+    """Draw the line of two fingers, or the cones of any other number of them."""
+    if len(holding) == 2:
+        return {}, _draw_line(drawn.ax, np.stack([_at(polygon, c) for c in holding.values()]))
+    angles = _cone_angles(polygon, mu, holding, center)
+    return {k: _draw_cone(drawn, polygon, c, *angles[k]) for k, c in holding.items()}, None
+
+
+def _draw_cone(
+    drawn: PolygonArtists, polygon: Polygon, contact: Contact, first: float, last: float
+) -> Wedge:
+    """Draw a cone as a pie as large as the object, clipped to it."""
+    apex, angles = _at(polygon, contact), np.linspace(first, last, 33)
+    rim = apex + polygon.diameter * np.stack([np.cos(angles), np.sin(angles)], axis=1)
+    color = palette.SKY
+    wedge = Wedge(
+        np.vstack([apex, rim]),
+        closed=True,
+        zorder=palette.CONE_LAYER,
+        linewidth=0.6,
+        facecolor=(color, 0.22),
+        edgecolor=(color, 0.9),
+    )
+    drawn.ax.add_patch(wedge)
+    wedge.set_clip_path(drawn.fill.get_path(), drawn.ax.transData)
+    return wedge
+
+
+def _draw_line(ax: Axes, ends: FloatArray) -> Line2D:
+    line = Line2D(
+        *ends.T,
+        color=palette.GREEN,
+        linestyle=palette.DASHES,
+        linewidth=1.4,
+        zorder=palette.LINE_LAYER,
+    )
+    ax.add_line(line)
+    return line
+
+
+def _points_along(line: Line2D) -> list[FloatArray]:
+    """Return points on a line, close to each other, for labels to avoid."""
+    first, last = np.asarray(line.get_xydata(), dtype=np.float64)
+    return list(first + np.linspace(0, 1, 40)[:, None] * (last - first))
+
+
+def _draw_arrow(
+    ax: Axes, polygon: Polygon, frame: Frame, old: Contact, new: Contact
+) -> FancyArrowPatch | None:
+    """Draw the arrow of a slide, beside its edge; none if the finger stays where it is."""
+    to = _at(polygon, new)
+    assert old.fraction is not None
+    assert new.fraction is not None
+    if old.fraction == new.fraction:
+        return None
+    along = frame.directions(polygon.tangents[new.edge]) * np.sign(new.fraction - old.fraction)
+    length = float(np.hypot(*(frame.points(to) - frame.points(_at(polygon, old)))))
+    tail = to - frame.lengths(along * max(length, _ARROW_LEAST))
+    shift = -_ARROW_SHIFT * frame.directions(polygon.normals[new.edge])
+    arrow = FancyArrowPatch(
+        (tail[0], tail[1]),
+        (to[0], to[1]),
+        transform=shifted(ax, shift),
+        arrowstyle="-|>",
+        mutation_scale=8,
+        shrinkA=0,
+        shrinkB=0,
+        linewidth=1.3,
+        color=palette.VERMILLION,
+        zorder=palette.ARROW_LAYER,
+    )
+    ax.add_patch(arrow)
+    return arrow
+
+
+# --- fingers ------------------------------------------------------------------------------------
+
+
+@dataclass(frozen=True)
+class _Style:
+    """Colours of circle, ring, number and contact; width of the ring; line of the leader."""
+
+    face: str
+    ring: str
+    number: str
+    contact: str
+    width: float = 1.0
+    line: str = "-"
+
+
+_SUPPORTING = _Style(palette.BLUE, palette.BLUE, "white", palette.BLUE)
+_TOUCHING = _Style("white", palette.BLUE, palette.BLUE, palette.BLUE)
+_MOVED = _Style(palette.VERMILLION, palette.INK, "white", palette.INK, 1.5)
+_RELEASED = _Style("white", palette.GREY, palette.GREY, "white", 1.0, ":")
+
+
+def _style(finger: int, holding: Collection[int], highlight: Collection[int]) -> _Style:
+    if finger in highlight:
+        return _MOVED
+    return _SUPPORTING if finger in holding else _TOUCHING
+
+
+def _place_fingers(
+    polygon: Polygon, frame: Frame, contacts: list[Contact], avoid: list[FloatArray]
+) -> list[Placed]:
+    """Places of the circles of fingers at the contacts."""
+    half = np.full(2, palette.FINGER_RADIUS)
+    labels = [
+        Label(
+            frame.points(_at(polygon, contact)),
+            -frame.directions(polygon.normals[contact.edge]),
+            half,
+            np.zeros(2),
+        )
+        for contact in contacts
+    ]
+    points = frame.points(np.reshape(avoid, (-1, 2)))
+    placed = place(paper_of(polygon, frame), labels, _SEARCH, avoid=points)
+    return [p for p in placed if p is not None]  # all: the search has no limit
+
+
+def _draw_finger(
+    ax: Axes, frame: Frame, finger: int, placed: Placed, style: _Style
+) -> FingerArtists:
+    x, y = frame.coordinates(placed.anchor)
+    to = frame.coordinates(placed.center)
+    beside = shifted(ax, placed.center - placed.anchor)
+    ring: dict[str, Any] = {"markeredgecolor": style.ring, "linestyle": "none", "marker": "o"}
+    dot = Line2D(
+        [x],
+        [y],
+        markersize=3.6,
+        markerfacecolor=style.contact,
+        markeredgewidth=0.8,
+        zorder=palette.CONTACT_LAYER,
+        **ring,
+    )
+    leader = Line2D(
+        [x, to[0]],
+        [y, to[1]],
+        color=style.ring,
+        linewidth=0.9,
+        linestyle=style.line,
+        zorder=palette.LEADER_LAYER,
+    )
+    circle = Line2D(
+        [x],
+        [y],
+        markersize=2 * palette.FINGER_RADIUS,
+        markerfacecolor=style.face,
+        markeredgewidth=style.width,
+        transform=beside,
+        zorder=palette.FINGER_LAYER,
+        **ring,
+    )
+    for artist in (dot, leader, circle):
+        ax.add_line(artist)
+    size = palette.FINGER_FONT if finger < 10 else palette.FINGER_FONT - 2
+    number = ax.text(
+        x,
+        y,
+        str(finger),
+        transform=beside,
+        ha="center",
+        va="center_baseline",
+        fontsize=size,
+        fontweight="bold",
+        color=style.number,
+        zorder=palette.TEXT_LAYER,
+    )
+    return FingerArtists(dot, leader, circle, number)

@@ -1,0 +1,25 @@
+"""Colours and sizes of all pictures; lengths in points (1/72 inch).
+
+The colours are those of Okabe and Ito (*Color universal design*, 2008), told apart with any kind
+of colour blindness; what a colour says is also said by a line style or a shape, for print.
+"""
+
+from __future__ import annotations
+
+INK = "#262626"
+GREY = "#8A8A8A"
+MATERIAL = "#EFEFEC"
+BLUE = "#0072B2"  # fingers that touch
+VERMILLION = "#D55E00"  # what has just moved
+SKY = "#56B4E9"  # friction cones
+GREEN = "#00795A"  # line of a two-finger grasp: bluish green, darkened to show on white
+
+DASHES = (0, (4, 2.5))  # of the line of a two-finger grasp, in line widths
+
+FINGER_RADIUS = 7.0
+FINGER_FONT = 8.5
+FINGER_GAP = 7.0  # from the contact to the circle of its finger
+MARGIN = 30.0  # room around the object for fingers and numbers
+
+OBJECT_LAYER, CONE_LAYER, OUTLINE_LAYER, LINE_LAYER = 1.0, 1.5, 2.0, 3.0
+ARROW_LAYER, LEADER_LAYER, CONTACT_LAYER, FINGER_LAYER, TEXT_LAYER = 4.0, 5.0, 6.0, 7.0, 8.0
