@@ -189,8 +189,9 @@ class Cones:
         With ``c = T1 × T2``, ``d = T1 · T2`` and ``s = ±1`` for the two sides,
         ``e1 × e2 = c (1 + s1 s2 μ1 μ2) + (s1 μ1 − s2 μ2) d``. Each of the two terms carries at most
         eight roundings, each relative to the sum of the magnitudes of its products, so 16 unit
-        roundoffs of these magnitudes bound the error. A bound of 0 proves a 0. Values of nearly
-        parallel rays are taken from integers, so that they too have full relative accuracy.
+        roundoffs of these magnitudes bound the error. Where every product has a factor 0, it is 0.
+        Values of nearly parallel rays are taken from integers, so that they too have full relative
+        accuracy; their signs are too, for a value may be smaller than any double.
         """
         x, y = self.vectors.T
         xy, yx = np.outer(x, y), np.outer(y, x)
@@ -208,7 +209,10 @@ class Cones:
         bound *= 16 * UNIT_ROUNDOFF
         lengths = self.ray_lengths
         inaccurate = np.maximum(bound, _NEARLY_PARALLEL * np.outer(lengths, lengths))
-        open_ = (np.abs(value) <= inaccurate) & (bound > 0)
+        sx, sy = np.abs(np.sign(x)), np.abs(np.sign(y))
+        crossing = of_rays(np.outer(sx, sy) + np.outer(sy, sx))
+        along = of_rays(np.outer(sx, sx) + np.outer(sy, sy))
+        open_ = (np.abs(value) <= inaccurate) & ((crossing > 0) | ((difference != 0) & (along > 0)))
         first, second = np.nonzero(np.triu(open_, 1))
         if first.size:
             e1, e2 = self.exact_rays[first], self.exact_rays[second]
@@ -218,7 +222,11 @@ class Cones:
             value[first, second] = accurate
             value[second, first] = -accurate
         np.fill_diagonal(value, 0.0)
-        return value, np.sign(value).astype(np.int8)
+        sign = np.sign(value).astype(np.int8)
+        if first.size:
+            sign[first, second] = [(c > 0) - (c < 0) for c in exact]
+            sign[second, first] = -sign[first, second]
+        return value, sign
 
     @property
     def cross(self) -> FloatArray:

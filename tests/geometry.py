@@ -152,9 +152,7 @@ def exact_ray(cones: Cones, ray: int) -> Exact:
 def exact_point(cones: Cones, edge: int, fraction: Fraction) -> Exact:
     """The point of an edge at a rational fraction of it."""
     a, b = cones.starts[edge].tolist(), cones.ends[edge].tolist()
-    x, y = (
-        Fraction(p) + fraction * (Fraction(q) - Fraction(p)) for p, q in zip(a, b, strict=True)
-    )
+    x, y = (Fraction(p) + fraction * (Fraction(q) - Fraction(p)) for p, q in zip(a, b, strict=True))
     return x, y
 
 

@@ -62,7 +62,8 @@ class Brute:
 
     def follows(self, a: int, b: int) -> bool:
         return all(
-            cross(self.rays[2 * a + s], self.rays[2 * b + t]) > 0 for s, t in product((0, 1), (0, 1))
+            cross(self.rays[2 * a + s], self.rays[2 * b + t]) > 0
+            for s, t in product((0, 1), (0, 1))
         )
 
     def two_finger(self) -> list[tuple[int, int]]:

@@ -283,9 +283,7 @@ def synthetic_pairs(seed: int, n: int, held: int) -> tuple[Synthetic, Synthetic]
         shaken = rng.random(n) < 0.3
         direction = rng.choice([-1, 1], (n, 2))
         low = np.where(shaken[:, None], np.nextafter(low, low + direction), low)
-        slopes = np.where(
-            shaken[:, None, None] & (slopes > 0), np.nextafter(slopes, 0.0), slopes
-        )
+        slopes = np.where(shaken[:, None, None] & (slopes > 0), np.nextafter(slopes, 0.0), slopes)
         result.append(synthetic(low, lift, slopes))
     return result[0], result[1]
 
@@ -534,9 +532,7 @@ def test_with_friction_above_one_and_two_centres() -> None:
     assert count.max() > 1
     for held in (1, 2):
         found = pairs_within(shadows([functions], held), most=1500)
-        same = (
-            functions.edges[found.first.row] == functions.edges[found.second.row]
-        ).all(axis=1)
+        same = (functions.edges[found.first.row] == functions.edges[found.second.row]).all(axis=1)
         assert same.any()
         joins = best_joins(
             found.first.take(np.flatnonzero(same)),
@@ -555,8 +551,9 @@ def test_all_three_contacts_held_between_two_centres() -> None:
 
     rule = SwitchRule(stacks, Hand(), decide)
     first, second, held = rule.pairs()
-    edges = np.concatenate([np.pad(f.edges, ((0, 0), (0, 3 - f.m)), constant_values=-1)
-                            for f in stacks])
+    edges = np.concatenate(
+        [np.pad(f.edges, ((0, 0), (0, 3 - f.m)), constant_values=-1) for f in stacks]
+    )
     same = (edges[first] == edges[second]).all(axis=1)
     assert same.any()
     assert (held[same] >= 2).all()

@@ -321,7 +321,16 @@ def test_unit_square_with_opposite_rays_has_exactly_these_sets() -> None:
         (pairs, [[0, 2], [1, 3]]),
         (
             triples,
-            [[0, 0, 2], [0, 1, 2], [0, 2, 2], [0, 2, 3], [0, 1, 3], [1, 1, 3], [1, 2, 3], [1, 3, 3]],
+            [
+                [0, 0, 2],
+                [0, 1, 2],
+                [0, 2, 2],
+                [0, 2, 3],
+                [0, 1, 3],
+                [1, 1, 3],
+                [1, 2, 3],
+                [1, 3, 3],
+            ],
         ),
     ):
         functions = torque_functions(cones, edges)
@@ -419,9 +428,7 @@ def test_independent_regions_are_those_with_closed_corners(name: str, m: int) ->
     edges = candidates[rng.integers(0, len(candidates), 200)]
     ends = np.sort(rng.integers(0, 9, (2, 200, m)) / 8, axis=0)
     # Small boxes about the middle are often independent, wide ones are not.
-    ends[:, ::2] = np.clip(
-        np.stack((0.5 - ends[0, ::2] / 4, 0.5 + ends[1, ::2] / 8)), 0, 1
-    )
+    ends[:, ::2] = np.clip(np.stack((0.5 - ends[0, ::2] / 4, 0.5 + ends[1, ::2] / 8)), 0, 1)
     lower, upper = ends
     functions = torque_functions(cones, edges)
     independent = functions.independent(lower, upper)

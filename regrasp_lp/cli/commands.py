@@ -28,6 +28,7 @@ from regrasp_lp.errors import (
 from regrasp_lp.files import write_atomically
 from regrasp_lp.friction import FloatArray, per_edge_friction
 from regrasp_lp.planning.planner import checked_grasp
+from regrasp_lp.switches import SwitchesOnDemand
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -68,23 +69,23 @@ def _found_plan(
     options: Namespace,
 ) -> Plan:
     start, goal = given["start"], given["goal"]
-    if start is not None and goal is not None and options.solver == "clarabel":
+    built = None
+    if start is None or goal is None or options.solver != "clarabel":
         with ProgressBar() as bar:
-            bar("planning", 0, 0)
-            return regrasp_lp.plan_regrasp(
-                polygon, start, goal, friction, hand, sets=options.sets, aligning=options.aligning
-            )
-    with ProgressBar() as bar:
-        built = _built(polygon, friction, hand, options, bar)
-        bar("choosing grasps", 0, 0)
-        start, goal = _complete(built, given)
-    missing = [role for role in _ROLES if given[role] is None]
-    if missing:
-        print(_choice_text(missing, {"start": start, "goal": goal}))
-        print(flush=True)
+            built = _built(polygon, friction, hand, options, bar)
+            bar("choosing grasps", 0, 0)
+            start, goal = _complete(built, given)
+        if None in given.values():
+            print(_choice_text(given, {"start": start, "goal": goal}), end="\n\n", flush=True)
+        if options.solver == "clarabel" and isinstance(built.switches, SwitchesOnDemand):
+            built = None  # faster without it
     with ProgressBar() as bar:
         bar("planning", 0, 0)
-        return built.plan(start, goal, aligning=options.aligning)
+        if built is not None:
+            return built.plan(start, goal, aligning=options.aligning)
+        return regrasp_lp.plan_regrasp(
+            polygon, start, goal, friction, hand, sets=options.sets, aligning=options.aligning
+        )
 
 
 def _built(
@@ -243,16 +244,15 @@ def _complete(graph: SwitchingGraph, given: dict[str, Grasp | None]) -> tuple[Gr
     return far_apart(graph, given["start"], given["goal"])
 
 
-def _choice_text(missing: list[str], chosen: dict[str, Grasp]) -> str:
+def _choice_text(given: dict[str, Grasp | None], chosen: dict[str, Grasp]) -> str:
+    missing = [role for role in _ROLES if given[role] is None]
     if len(missing) == 2:
         head = "No start and no goal given; these two grasps are far apart in the graph:"
     else:
         other = "goal" if missing == ["start"] else "start"
         head = f"No {missing[0]} given; this one is far from the {other} in the graph:"
     width = max(len(role) for role in missing)
-    return "\n".join(
-        [head, *(f"  --{role:<{width}} {grasp_text(chosen[role], 15)}" for role in missing)]
-    )
+    return "\n".join([head, *(f"  --{r:<{width}} {grasp_text(chosen[r])}" for r in missing)])
 
 
 # --- files --------------------------------------------------------------------------------------

@@ -12,7 +12,11 @@ from regrasp_lp.errors import ContactError, NoPlanFound
 from regrasp_lp.friction import IntArray
 from regrasp_lp.planning.search import placements_from
 from regrasp_lp.quality import margin
+from regrasp_lp.switches import SwitchesOnDemand
 from regrasp_lp.switching_graph import SwitchingGraph
+
+_LOOK_AT = 300
+"""Sets whose neighbours are looked at where switches are found on demand, for a second's work."""
 
 
 def far_apart(
@@ -23,6 +27,7 @@ def far_apart(
     What is given is kept. Otherwise they are good grasps of two sets: in the largest component
     the set farthest from its first one, and the set farthest from that. Of equally far sets the
     one with the largest margin is taken (to a millionth of the object's diameter), then the first.
+    In graphs too large to store it is a far set, though not always the farthest.
 
     Parameters
     ----------
@@ -48,22 +53,30 @@ def far_apart(
         # The way back places as many fingers, but for those that the two ends differ by.
         fewer = graph.sets.contacts
         return _rounded(graph, _farthest(graph, graph.locate(goal), fewer)), goal
-    components = graph.components()
-    if not components:
-        raise NoPlanFound("no plan exists: the object has no grasp set; friction may be too low")
-    if len(components[0]) == 1:
+    if not len(graph):
+        raise NoPlanFound("no plan exists: the object has no grasp set at this friction")
+    first = _farthest(graph, [_beginning(graph)])
+    second = _farthest(graph, [first])
+    if first == second:
         raise NoPlanFound(
             "no two grasp sets are joined, so that none are far apart: give start and goal"
         )
-    first = _farthest(graph, [min(components[0])])
-    return _rounded(graph, first), _rounded(graph, _farthest(graph, [first]))
+    return _rounded(graph, first), _rounded(graph, second)
+
+
+def _beginning(graph: SwitchingGraph) -> int:
+    """Return a set from which to look for a far one."""
+    if isinstance(graph.switches, SwitchesOnDemand):
+        return int(graph.sets.margins.argmax())  # to find the components would take long
+    return min(graph.components()[0])
 
 
 def _farthest(graph: SwitchingGraph, sources: Iterable[int], fewer: IntArray | None = None) -> int:
     """Return the set that needs most placements from the sources, less `fewer` of each set."""
     sets = graph.sets
+    most = _LOOK_AT if isinstance(graph.switches, SwitchesOnDemand) else None
     found = placements_from(
-        sets.contacts, sets.margins, graph.switches, graph.hand, dict.fromkeys(sources, 0)
+        sets.contacts, sets.margins, graph.switches, graph.hand, dict.fromkeys(sources, 0), most
     )
     reached = np.flatnonzero(found >= 0)
     far = found[reached] if fewer is None else (found - fewer)[reached]

@@ -12,15 +12,19 @@ from regrasp_lp.contact import Contact, Grasp
 PICTURES = (".png", ".svg", ".pdf")
 
 
-def grasp_text(grasp: Grasp, digits: int = 17) -> str:
-    """Return a grasp in the form that ``--start`` takes.
+def grasp_text(grasp: Grasp, digits: int | None = None) -> str:
+    """Return a grasp in the form that ``--start`` takes, exactly or with so many digits.
 
     Examples
     --------
-    >>> grasp_text(Grasp([(4, 0.25), (0, 1.2)]), digits=6)
-    '4:0.25,0:1.2'
+    >>> grasp_text(Grasp([(4, 0.25), (0, 1 / 3)]))
+    '4:0.25,0:0.3333333333333333'
+    >>> grasp_text(Grasp([(4, 0.25), (0, 1 / 3)]), digits=4)
+    '4:0.25,0:0.3333'
     """
-    return ",".join(f"{contact.edge}:{contact.position:.{digits}g}" for contact in grasp)
+    form = "" if digits is None else f".{digits}g"
+    pairs = zip(grasp.edges.tolist(), grasp.positions.tolist(), strict=True)
+    return ",".join(f"{edge}:{position:{form}}" for edge, position in pairs)
 
 
 def grasp(text: str) -> Grasp:

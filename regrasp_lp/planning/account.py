@@ -2,20 +2,17 @@
 
 from __future__ import annotations
 
+from textwrap import wrap
 from typing import TYPE_CHECKING
 
 from regrasp_lp.contact import Contact
 from regrasp_lp.planning.steps import Place, Release, Slide, Step
 
 if TYPE_CHECKING:
-    from regrasp_lp.planning.plan import HeldGrasp, Plan
+    from regrasp_lp.planning.plan import Plan
 
-_KINDS = {
-    "two_finger": "two-finger",
-    "three_finger": "three-finger",
-    "concurrent": "concurrent",
-    "parallel": "parallel",
-}
+_STEP_WIDTH = 41
+"""Of the column of steps, for an account of less than 80 columns."""
 
 
 def account(plan: Plan) -> str:
@@ -35,8 +32,7 @@ def account(plan: Plan) -> str:
         f"{plan.hand.fingers} fingers",
         f"margin {plan.margin:.4g}, tolerance {plan.tolerance:.4g}"
         + (
-            f" (where the planner chose: margin {plan.chosen_margin:.4g}, "
-            f"tolerance {plan.chosen_tolerance:.4g})"
+            f"; where the planner chose {plan.chosen_margin:.4g} and {plan.chosen_tolerance:.4g}"
             if plan.chosen_margin < float("inf")
             else ""
         ),
@@ -44,13 +40,20 @@ def account(plan: Plan) -> str:
     ]
     texts = ["start: " + ", ".join(f"{k} on {_at(c)}" for k, c in plan.start.items())]
     texts += [describe(step) for step in plan.steps]
-    width = max(len(text) for text in texts) + 2
-    lines = []
+    lines = [_row("", "step", "held by", "margin", "on the way")]
     for i, (text, grasp) in enumerate(zip(texts, plan.grasps, strict=True)):
-        least = plan.slide_margins[i - 1] if i else float("inf")
-        lines.append(f"{i:>3}  {text:<{width}} {_held(grasp, least)}")
+        along = plan.slide_margins[i - 1] if i else float("inf")
+        fingers = ",".join(str(finger) for finger in grasp.support.fingers)
+        first, *rest = wrap(text, _STEP_WIDTH)
+        way = f"{along:.4g}" if along < grasp.margin else ""
+        lines.append(_row(str(i), first, fingers, f"{grasp.margin:.4g}", way))
+        lines += [_row("", line) for line in rest]
     goal = ", ".join(_at(contact) for contact in plan.goal)
     return "\n".join([*head, *lines, "", f"goal reached: {goal}"])
+
+
+def _row(number: str, step: str, fingers: str = "", margin: str = "", way: str = "") -> str:
+    return f"{number:>3}  {step:<{_STEP_WIDTH}}  {fingers:<9} {margin:>9}  {way:>10}".rstrip()
 
 
 def describe(step: Step) -> str:
@@ -73,9 +76,3 @@ def describe(step: Step) -> str:
 
 def _at(contact: Contact) -> str:
     return f"edge {contact.edge} at {contact.position:.4g}"
-
-
-def _held(grasp: HeldGrasp, along: float) -> str:
-    fingers = ",".join(str(finger) for finger in grasp.support.fingers)
-    text = f"{_KINDS[grasp.support.kind]} {fingers}: margin {grasp.margin:.4g}"
-    return text + (f", {along:.4g} on the way" if along < grasp.margin else "")

@@ -70,6 +70,7 @@ class PlanningProblem:
             self.hand,
             dict.fromkeys(sources, 0),
             {i: len(goal) - len(chosen) for i, chosen in targets.items()},
+            self._given((start, sources), (goal, targets)),
         )
         if path is None:
             return None
@@ -110,6 +111,16 @@ class PlanningProblem:
         for index, chosen in self.sets.holding(grasp):
             choices.setdefault(index, chosen)
         return sorted(choices.items())
+
+    def _given(self, *ends: tuple[Grasp, dict[int, tuple[int, ...]]]) -> dict[int, float]:
+        """Margin of the given contacts in each set that holds the start or the goal."""
+        margins: dict[int, float] = {}
+        for grasp, choices in ends:
+            for index, chosen in choices.items():
+                functions = self.sets.functions(index)
+                margin = float(functions.margins(grasp.fractions[list(chosen)])[0])
+                margins[index] = min(margin, margins.get(index, margin))
+        return margins
 
     def _handover(self, first: int, second: int) -> Handover:
         """The best way to switch that holds as many contacts as possible."""

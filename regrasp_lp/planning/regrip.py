@@ -6,11 +6,13 @@ from itertools import pairwise, permutations
 
 import numpy as np
 
-from regrasp_lp.errors import SolverError
+from regrasp_lp.errors import NoPlanFound, SolverError
 from regrasp_lp.friction import FloatArray
 from regrasp_lp.torque import TorqueFunctions
 
 _MOST_HALVINGS = 60
+
+_MOST_MOVES = 1000
 
 
 def regrip_moves(
@@ -40,6 +42,8 @@ def regrip_moves(
 
     Raises
     ------
+    NoPlanFound
+        If the set is so thin that thousands of moves would be needed.
     SolverError
         If even the shortest step loses force closure, which takes a way at the limit of rounding.
     """
@@ -57,10 +61,18 @@ def regrip_moves(
     return moves
 
 
-def _by_halving(functions: TorqueFunctions, f: FloatArray, g: FloatArray) -> list[tuple[int, float]]:
+def _by_halving(
+    functions: TorqueFunctions, f: FloatArray, g: FloatArray
+) -> list[tuple[int, float]]:
     moves: list[tuple[int, float]] = []
     pending = [(f, g, _MOST_HALVINGS)]
     while pending:
+        if len(moves) + len(pending) > _MOST_MOVES:
+            raise NoPlanFound(
+                f"aligning by repositioning on edges {functions.edges[0].tolist()} would take "
+                f"more than {_MOST_MOVES} placements, so thin is the set of grasps there: use "
+                'aligning="slide"'
+            )
         f, g, halvings = pending.pop(0)
         step = _in_some_order(functions, f, g)
         if step is not None:

@@ -21,6 +21,7 @@ def fewest_placements(
     hand: Hand,
     sources: Mapping[int, int],
     targets: Mapping[int, int],
+    given: Mapping[int, float] | None = None,
 ) -> list[int] | None:
     """Return a path of sets with the fewest placements, or None if there is none.
 
@@ -38,12 +39,14 @@ def fewest_placements(
     hand : Hand
     sources, targets : mapping of int to int
         Sets where a path may begin and end, with the placements needed before and after.
+    given : mapping of int to float, optional
+        Margin of the given grasp in a source or target, which no choice of contacts can raise.
 
     Returns
     -------
     list of int or None
     """
-    _, before = _settle(contacts, margins, switches, hand, sources, targets)
+    _, before = _settle(contacts, margins, switches, hand, sources, targets, given or {})
     return _trace(before, len(contacts))
 
 
@@ -53,6 +56,7 @@ def placements_from(
     switches: Switches,
     hand: Hand,
     sources: Mapping[int, int],
+    most: int | None = None,
 ) -> IntArray:
     """Return the fewest placements with which each set is reached, -1 for sets that are not.
 
@@ -60,12 +64,15 @@ def placements_from(
     ----------
     contacts, margins, switches, hand, sources
         As for `fewest_placements`.
+    most : int, optional
+        Look at the neighbours of so many sets only, the nearest ones: farther sets may then need
+        fewer placements than returned, or be reached after all.
 
     Returns
     -------
     numpy.ndarray of int, shape (N,)
     """
-    placements, _ = _settle(contacts, margins, switches, hand, sources, {})
+    placements, _ = _settle(contacts, margins, switches, hand, sources, {}, {}, most)
     return np.where(placements == _UNREACHED, -1, placements)[:-1]
 
 
@@ -76,10 +83,13 @@ def _settle(
     hand: Hand,
     sources: Mapping[int, int],
     targets: Mapping[int, int],
+    given: Mapping[int, float],
+    most: int | None = None,
 ) -> tuple[IntArray, IntArray]:
     """Placements needed to reach each set, and the set before it on the way (-1: none).
 
-    Entry N stands for the end of a path. The search stops once it is reached.
+    Entry N stands for the end of a path. The search stops once it is reached, or once the
+    neighbours of `most` sets have been looked at.
     """
     n = len(contacts)
     placements = np.full(n + 1, _UNREACHED)
@@ -98,16 +108,20 @@ def _settle(
             heapq.heappush(queue, item)
 
     for index, cost in sorted(sources.items()):
-        relax(-1, np.array([index]), np.array([cost]), margins[[index]])
-    while queue:
+        limit = given.get(index, np.inf)
+        relax(-1, np.array([index]), np.array([cost]), np.minimum(margins[[index]], limit))
+    looked_at = 0
+    while queue and looked_at != most:
         cost, negative, node = heapq.heappop(queue)
         if (cost, -negative) != (placements[node], least[node]):
             continue
         if node == n:
             break
+        looked_at += 1
         reached = least[node]
         if node in targets:
-            relax(node, np.array([n]), np.array([cost + targets[node]]), np.array([reached]))
+            end = min(reached, given.get(node, np.inf))
+            relax(node, np.array([n]), np.array([cost + targets[node]]), np.array([end]))
         others, held = switches.neighbors(node)
         relax(node, others, cost + contacts[others] - held, np.minimum(reached, margins[others]))
         for m, all_ in of_size.items():
