@@ -118,11 +118,13 @@ def switch_rule(
     """Return the contact rule: decided exactly, or by the margin LPs of joined pieces."""
 
     def decide(first: Shadows, second: Shadows) -> BoolArray:
-        if min_margin > 0:
-            return np.asarray(best_joins(first, second, solver).margins > min_margin)
-        if not presolve:
-            return best_joins(first, second, solver).exist
-        return decide_held(first, second, solver)
+        if presolve and min_margin == 0:
+            return decide_held(first, second, solver)
+        found = decide_held(first, second, solver) if presolve else np.ones(len(first), dtype=bool)
+        open_ = np.flatnonzero(found)
+        joins = best_joins(first.take(open_), second.take(open_), solver, enough=min_margin)
+        found[open_] = joins.exist & (joins.margins > min_margin)
+        return found
 
     return SwitchRule(sets.sources, hand, decide)
 

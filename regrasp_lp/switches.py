@@ -17,12 +17,13 @@ from typing import Protocol
 import numpy as np
 
 from regrasp_lp.friction import BoolArray, IntArray
+from regrasp_lp.grasp_sets.candidates import runs
 from regrasp_lp.planning.hand import Hand
 from regrasp_lp.shadows import Shadows, shadows
 from regrasp_lp.switching import can_switch
 from regrasp_lp.torque import TorqueFunctions
 
-STORE_LIMIT = 5_000_000
+STORE_LIMIT = 8_000_000
 """Up to so many pairs of sets with common edges the switches are stored, above found on demand."""
 
 _CHUNK = 200_000
@@ -77,7 +78,7 @@ class SwitchRule:
     def _levels(self) -> tuple[_Level, ...]:
         """The projections on 1, 2 and 3 contacts, grouped by edges; those that can matter."""
         return tuple(
-            _Level.of(shadows(self.sources, held), self.offsets)
+            _Level.of(shadows(self.sources, held), self)
             for held in (1, 2, 3)
             if any(
                 held <= min(f.m, g.m) and held >= self.need[f.m, g.m]
@@ -88,7 +89,7 @@ class SwitchRule:
 
     @property
     def n_pairs(self) -> int:
-        """Number of pairs with common edges, over all numbers of held contacts."""
+        """Number of pairs to decide: with common edges, over all numbers of held contacts."""
         return sum(level.n_pairs for level in self._levels)
 
     def chunks(self, tell: Tell | None = None) -> Iterator[tuple[IntArray, IntArray, IntArray]]:
@@ -148,34 +149,42 @@ class _Level:
     starts: IntArray  # of the groups
     sizes: IntArray
     group: IntArray  # of each projection
+    later: IntArray  # how many projections after it, in its group, each is paired with
 
     @classmethod
-    def of(cls, stack: Shadows, offsets: IntArray) -> _Level:
-        order = np.lexsort(stack.edges.T[::-1])
-        stack = stack.take(order)
+    def of(cls, stack: Shadows, rule: SwitchRule) -> _Level:
+        # Within a group two-finger sets come first: pairs for which so few held contacts do not
+        # suffice are then at its end, and are left out.
+        owner = rule.offsets[stack.source] + stack.row
+        contacts = rule.contacts[owner]
+        order = np.lexsort((contacts, *stack.edges.T[::-1]))
+        stack, owner, contacts = stack.take(order), owner[order], contacts[order]
         new = np.ones(len(stack), dtype=bool)
         new[1:] = (stack.edges[1:] != stack.edges[:-1]).any(axis=1)
         starts = np.flatnonzero(new)
         sizes = np.diff(np.append(starts, len(stack)))
-        owner = offsets[stack.source] + stack.row
-        return cls(stack, owner, starts, sizes, np.cumsum(new) - 1)
+        group = np.cumsum(new) - 1
+        rank = np.arange(len(stack)) - starts[group]
+        pairs = np.add.reduceat(contacts == 2, starts) if len(starts) else starts
+        suffices = rule.need <= stack.held
+        last = np.where(
+            suffices[contacts, 3], sizes[group], np.where(suffices[contacts, 2], pairs[group], 0)
+        )
+        return cls(stack, owner, starts, sizes, group, np.maximum(last - rank - 1, 0))
 
     @property
     def n_pairs(self) -> int:
-        return int((self.sizes * (self.sizes - 1) // 2).sum())
+        return int(self.later.sum())
 
     def all_pairs(self) -> Sequence[tuple[IntArray, IntArray]]:
         """All pairs within the groups, in chunks."""
-        rank = np.arange(len(self.owner)) - self.starts[self.group]
-        later = self.sizes[self.group] - rank - 1
-        chunk = np.cumsum(later) // _CHUNK
-        bounds = np.append(np.flatnonzero(np.diff(chunk, prepend=-1)), len(later))
+        chunk = np.cumsum(self.later) // _CHUNK
+        bounds = np.append(np.flatnonzero(np.diff(chunk, prepend=-1)), len(chunk))
         chunks = []
         for low, high in pairwise(bounds.tolist()):
-            counts = later[low:high]
+            counts = self.later[low:high]
             first = np.arange(low, high).repeat(counts)
-            ahead = np.arange(len(first)) - (np.cumsum(counts) - counts).repeat(counts)
-            chunks.append((first, first + 1 + ahead))
+            chunks.append((first, runs(np.arange(low, high) + 1, counts)))
         return chunks
 
     def pairs_of(self, index: int) -> tuple[IntArray, IntArray]:
@@ -210,7 +219,8 @@ class StoredSwitches:
         other = np.concatenate((second, first))
         order = np.lexsort((other, one))
         starts = np.searchsorted(one[order], np.arange(n + 1))
-        return cls(starts, other[order], np.concatenate((held, held))[order])
+        both = np.concatenate((held, held))[order]
+        return cls(starts, other[order].astype(np.int32), both.astype(np.int8))
 
     def neighbors(self, index: int) -> tuple[IntArray, IntArray]:
         """Return the sets that share at least one held contact with a set, and how many."""

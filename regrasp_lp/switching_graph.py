@@ -14,11 +14,12 @@ from scipy.sparse import csgraph
 
 from regrasp_lp.contact import Grasp
 from regrasp_lp.errors import NoPlanFound
-from regrasp_lp.friction import FloatArray, IntArray
+from regrasp_lp.friction import Cones, FloatArray, IntArray
 from regrasp_lp.grasp_sets.collection import GraspSets
 from regrasp_lp.handovers import Handover, handovers
 from regrasp_lp.lp import Solver, get_solver
 from regrasp_lp.planning.hand import Hand
+from regrasp_lp.planning.on_demand import problem_on_demand
 from regrasp_lp.planning.plan import Plan
 from regrasp_lp.planning.planner import (
     GraspLike,
@@ -31,6 +32,7 @@ from regrasp_lp.summary import Summary
 from regrasp_lp.switches import (
     StoredSwitches,
     Switches,
+    SwitchesOnDemand,
 )
 
 if TYPE_CHECKING:
@@ -374,6 +376,11 @@ class SwitchingGraph:
                     f"{len(self)} {self.options.sets} sets" + self._why_in_no_set()
                 )
         problem = PlanningProblem(self.sets, self.switches, self.hand, self.friction, self._solver)
+        if self._too_large_to_search:
+            nearer = problem_on_demand(
+                self.polygon, self._cones, self._solver, grasps["start"], grasps["goal"]
+            )
+            problem = problem if nearer is None else nearer
         plan = problem.plan(grasps["start"], grasps["goal"], aligning)
         if plan is None:
             raise NoPlanFound(
@@ -382,6 +389,17 @@ class SwitchingGraph:
                 f"{len(self.components())} components"
             )
         return plan
+
+    @property
+    def _cones(self) -> Cones:
+        return self.sets.families[0].functions.cones
+
+    @property
+    def _too_large_to_search(self) -> bool:
+        """Whether switches are not stored and a search without them finds the same."""
+        options = GraphOptions(solver=self.options.solver, presolve=self.options.presolve)
+        on_demand = isinstance(self.switches, SwitchesOnDemand)
+        return on_demand and self.hand == Hand(4) and self.options == options
 
     def _why_in_no_set(self) -> str:
         if self.options.min_margin:

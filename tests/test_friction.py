@@ -51,6 +51,14 @@ def test_cross_products_and_their_signs_are_those_of_the_rationals(name: str, mu
     assert_exact(Cones.of(polygon, friction[: polygon.n_edges] if mu is None else mu))
 
 
+def test_nearly_parallel_rays_have_accurate_crosses() -> None:
+    """Edges of length 1 whose directions differ by 1e-9 and less: the products cancel."""
+    for step in (1e-6, 1e-9, 1e-12, 1e-15):
+        points = [(0.1, 0.2), (1.1, 0.5), (1.3 + step, 1.7), (0.3, 1.4)]
+        assert_exact(Cones.of(Polygon(points), 0.7))
+        assert_exact(Cones.of(Polygon(points), [0.7, 0.4, 0.7 + step, 0.4 - step]))
+
+
 @settings(max_examples=40)
 @given(st.integers(4, 9), st.integers(0, 10**6), st.lists(st.sampled_from([0.25, 0.5, 1, 2, 4])))
 def test_cross_products_on_lattice_stars(n: int, seed: int, mu: list[float]) -> None:

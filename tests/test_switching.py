@@ -273,12 +273,15 @@ def synthetic(low: np.ndarray, lift: np.ndarray, slopes: np.ndarray) -> Syntheti
 
 
 def synthetic_pairs(seed: int, n: int, held: int) -> tuple[Synthetic, Synthetic]:
-    """Small integers, so that ends meet; some values are off by one unit in the last place."""
+    """Small integers, so that ends meet; some values are off by one unit in the last place.
+
+    As with grasp sets, nowhere do all functions vanish at once: the first one has a lift.
+    """
     rng = np.random.default_rng([seed, held])
     result = []
     for _ in range(2):
         low = rng.integers(-4, 3, (n, 2)).astype(float)
-        lift = rng.integers(0, 3, (n, 2)).astype(float)
+        lift = rng.integers([1, 0], 3, (n, 2)).astype(float)
         slopes = rng.integers(0, 4, (n, 2, held)).astype(float)
         shaken = rng.random(n) < 0.3
         direction = rng.choice([-1, 1], (n, 2))
@@ -331,12 +334,16 @@ rising = st.integers(0, 3)
 
 
 def exact_shadows(held: int) -> st.SearchStrategy:
+    """Up to three functions, not all of them without a lift."""
     function = st.tuples(small, rising, st.tuples(*[rising] * held))
     functions = st.lists(function, min_size=1, max_size=3)
     return functions.map(
         lambda given: (
             [[Fraction(c), *map(Fraction, s)] for c, _, s in given],
-            [[Fraction(c + lift), *map(Fraction, s)] for c, lift, s in given],
+            [
+                [Fraction(c + lift + (number == 0)), *map(Fraction, s)]
+                for number, (c, lift, s) in enumerate(given)
+            ],
         )
     )
 

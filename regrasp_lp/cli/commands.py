@@ -14,7 +14,6 @@ from typing import TYPE_CHECKING, Any
 import regrasp_lp
 from regrasp_lp import Grasp, Hand, Plan, Polygon, SwitchingGraph
 from regrasp_lp.cli.far_apart import far_apart
-from regrasp_lp.cli.layout import fitted, table
 from regrasp_lp.cli.progress import ProgressBar
 from regrasp_lp.cli.values import PICTURES, grasp_text
 from regrasp_lp.errors import (
@@ -42,7 +41,7 @@ def plan(options: Namespace) -> int:
     """Plan from one grasp to another."""
     _check_outputs(options.file, options.json, options.plot)
     polygon = _one_polygon(options.file, options.name)
-    friction = per_edge_friction(options.friction, polygon.n_edges)
+    friction = _friction(polygon, options.friction)
     hand = Hand(options.fingers)
     given: dict[str, Grasp | None] = {}
     for role in _ROLES:
@@ -51,7 +50,7 @@ def plan(options: Namespace) -> int:
             asked = checked_grasp(polygon, asked, friction, hand, role)
         given[role] = asked
     found = _found_plan(polygon, friction, hand, given, options)
-    print(fitted(str(found)))
+    print(found)
     print("It has passed an exact check.", flush=True)
     if options.json:
         with _writing(options.json):
@@ -109,10 +108,7 @@ def graph(options: Namespace) -> int:
     if options.save and len(polygons) > 1:
         raise OptionError(f"--save takes one graph, but {_several(options.file, polygons)}")
     for number, polygon in enumerate(polygons):
-        try:
-            friction = per_edge_friction(options.friction, polygon.n_edges)
-        except FrictionError as error:
-            raise FrictionError(f"{polygon.name}: {error}") from error
+        friction = _friction(polygon, options.friction)
         with ProgressBar() as bar:
             built = _built(polygon, friction, Hand(options.fingers), options, bar)
             bar("counting", 0, 0)
@@ -197,6 +193,15 @@ def _listed(names: list[str]) -> str:
     return ", ".join(names[:_MOST_NAMES]) + (f" and {more} more" if more > 0 else "")
 
 
+def _friction(polygon: Polygon, asked: float | list[float]) -> FloatArray:
+    if isinstance(asked, list) and len(asked) != polygon.n_edges:
+        raise FrictionError(
+            f"--friction has {len(asked)} values, but {polygon.name!r} has {polygon.n_edges} edges: "
+            "give one value, or one for each edge"
+        )
+    return per_edge_friction(asked, polygon.n_edges)
+
+
 def _description(polygon: Polygon) -> str:
     width, height = polygon.bounds[2:] - polygon.bounds[:2]
     holes = f", {_count(len(polygon.holes), 'hole')}" if polygon.holes else ""
@@ -215,7 +220,14 @@ def _edge_table(polygon: Polygon) -> str:
         ring = int(polygon.ring_of_edge[edge])
         where = f"hole {ring}" if ring else ""
         rows.append((str(edge), start, end, f"{polygon.edge_lengths[edge]:.6g}", where))
-    return table(rows)
+    widths = [max(map(len, column)) for column in zip(*rows, strict=True)]
+    # the last column, with nothing to its right, is aligned to the left
+    return "\n".join(
+        "  ".join(
+            [*(cell.rjust(width) for cell, width in zip(row[:-1], widths, strict=False)), row[-1]]
+        ).rstrip()
+        for row in rows
+    )
 
 
 # --- grasps -------------------------------------------------------------------------------------

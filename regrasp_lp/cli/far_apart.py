@@ -38,7 +38,7 @@ def far_apart(
     Returns
     -------
     start, goal : Grasp
-        Chosen ones are at positions of few digits, which `grasp_text` gives exactly.
+        Chosen ones are at positions of few digits; `grasp_text` gives them exactly.
 
     Raises
     ------
@@ -99,10 +99,10 @@ def _rounded(graph: SwitchingGraph, index: int) -> Grasp:
         moved = polygon.resolve(Grasp.at_fractions(pairs))
         for digits in (4, 8, 12):
             try:
-                rounded = polygon.resolve(grasp(grasp_text(moved, digits)))
+                rounded = grasp(grasp_text(moved, digits))
+                enough = margin(polygon, rounded, graph.friction) >= kept * largest
+                if enough and index in graph.locate(rounded):
+                    return rounded
             except ContactError:  # rounded off the end of its edge
                 continue
-            enough = margin(polygon, rounded, graph.friction) >= kept * largest
-            if enough and index in graph.locate(rounded):
-                return rounded
-    return polygon.resolve(grasp(grasp_text(best)))
+    return grasp(grasp_text(best))

@@ -13,7 +13,7 @@ PICTURES = (".png", ".svg", ".pdf")
 
 
 def grasp_text(grasp: Grasp, digits: int | None = None) -> str:
-    """Return a grasp in the form that ``--start`` takes, exactly or with so many digits.
+    """Return a grasp in the form that ``--start`` takes: exactly, or with so many digits.
 
     Examples
     --------
@@ -22,9 +22,11 @@ def grasp_text(grasp: Grasp, digits: int | None = None) -> str:
     >>> grasp_text(Grasp([(4, 0.25), (0, 1 / 3)]), digits=4)
     '4:0.25,0:0.3333'
     """
-    form = "" if digits is None else f".{digits}g"
     pairs = zip(grasp.edges.tolist(), grasp.positions.tolist(), strict=True)
-    return ",".join(f"{edge}:{position:{form}}" for edge, position in pairs)
+    return ",".join(
+        f"{edge}:" + (repr(u).removesuffix(".0") if digits is None else f"{u:.{digits}g}")
+        for edge, u in pairs
+    )
 
 
 def grasp(text: str) -> Grasp:

@@ -17,6 +17,7 @@ import numpy as np
 
 from regrasp_lp.contact import Grasp
 from regrasp_lp.friction import Cones, FloatArray, IntArray, spanning
+from regrasp_lp.grasp_sets.candidates import runs
 from regrasp_lp.grasp_sets.collection import GraspSets
 from regrasp_lp.grasp_sets.vertices import solve_family
 from regrasp_lp.lp import Solver
@@ -207,9 +208,7 @@ def _matches(one: IntArray, other: IntArray) -> tuple[IntArray, IntArray]:
     order = np.argsort(theirs, kind="stable")
     first = np.searchsorted(theirs[order], mine)
     counts = np.searchsorted(theirs[order], mine, side="right") - first
-    i = np.arange(len(one)).repeat(counts)
-    ahead = np.arange(len(i)) - (np.cumsum(counts) - counts).repeat(counts)
-    return i, order[first.repeat(counts) + ahead]
+    return np.arange(len(one)).repeat(counts), order[runs(first, counts)]
 
 
 def _best_parent(
