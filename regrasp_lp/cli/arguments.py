@@ -55,20 +55,20 @@ exit codes:
   2  an error"""
 
 _GRAPH = """\
-Compute all grasp sets of an object and the switches between them, and print how
-many there are of each kind, how they hang together, and how long it took.
+Compute all grasp sets of an object and the switches between them, and print
+how many there are of each kind, how they hang together, and how long it took.
 Without --name all polygons of the file are taken, one after the other."""
 
 _GRAPH_EXAMPLES = """\
 examples:
   regrasp-lp graph parts.geojson --friction 0.2
   regrasp-lp graph parts.geojson --name hex_nut --friction 0.2 --sets chapter
-  regrasp-lp graph parts.geojson --name hex_nut --friction 0.2 --save hex_nut.npz"""
+  regrasp-lp graph parts.geojson --name hex_nut --friction 0.2 --save nut.npz"""
 
 _SHOW = """\
 Draw an object with the numbers of its edges, or list them. Edges are numbered
-counter-clockwise along the outline, from the first vertex (a small circle marks
-it), then clockwise along the holes. Drawing needs matplotlib, listing does not."""
+counter-clockwise along the outline, from the first vertex (marked by a small
+circle), then clockwise along the holes. Only drawing needs matplotlib."""
 
 _SHOW_EXAMPLES = """\
 examples:

@@ -196,8 +196,8 @@ def _listed(names: list[str]) -> str:
 def _friction(polygon: Polygon, asked: float | list[float]) -> FloatArray:
     if isinstance(asked, list) and len(asked) != polygon.n_edges:
         raise FrictionError(
-            f"--friction has {len(asked)} values, but {polygon.name!r} has {polygon.n_edges} edges: "
-            "give one value, or one for each edge"
+            f"--friction has {len(asked)} values, but {polygon.name!r} has {polygon.n_edges} "
+            "edges: give one value, or one for each edge"
         )
     return per_edge_friction(asked, polygon.n_edges)
 

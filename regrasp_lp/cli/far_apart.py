@@ -48,11 +48,11 @@ def far_apart(
     if start is not None and goal is not None:
         return start, goal
     if start is not None:
-        return start, _rounded(graph, _farthest(graph, graph.locate(start)))
+        return start, chosen_grasp(graph, _farthest(graph, graph.locate(start)))
     if goal is not None:
         # The way back places as many fingers, but for those that the two ends differ by.
         fewer = graph.sets.contacts
-        return _rounded(graph, _farthest(graph, graph.locate(goal), fewer)), goal
+        return chosen_grasp(graph, _farthest(graph, graph.locate(goal), fewer)), goal
     if not len(graph):
         raise NoPlanFound("no plan exists: the object has no grasp set at this friction")
     first = _farthest(graph, [_beginning(graph)])
@@ -61,7 +61,7 @@ def far_apart(
         raise NoPlanFound(
             "no two grasp sets are joined, so that none are far apart: give start and goal"
         )
-    return _rounded(graph, first), _rounded(graph, second)
+    return chosen_grasp(graph, first), chosen_grasp(graph, second)
 
 
 def _beginning(graph: SwitchingGraph) -> int:
@@ -84,11 +84,21 @@ def _farthest(graph: SwitchingGraph, sources: Iterable[int], fewer: IntArray | N
     return int(reached[np.lexsort((reached, -margins, -far))[0]])
 
 
-def _rounded(graph: SwitchingGraph, index: int) -> Grasp:
-    """Return a good grasp of a set at positions of few digits.
+def chosen_grasp(graph: SwitchingGraph, index: int) -> Grasp:
+    """Return a good grasp of a set, at positions of few digits.
 
     The best grasp is often at the ends of edges, where no error of place is tolerated: it is
     moved off them if that keeps most of its margin.
+
+    Parameters
+    ----------
+    graph : SwitchingGraph
+    index : int
+
+    Returns
+    -------
+    Grasp
+        Strictly inside the set, with 90 % of its margin or more; not resolved.
     """
     polygon = graph.polygon
     best = graph.sets.witness(index)

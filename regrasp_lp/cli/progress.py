@@ -63,10 +63,13 @@ class ProgressBar:
         width = 0
         try:
             while not self._ended.wait(wait):
+                wait = _REDRAW
+                if not self._state[0]:
+                    continue  # nothing told yet
                 line = self._line()
                 self._stream.write("\r" + line.ljust(width))
                 self._stream.flush()
-                wait, width = _REDRAW, len(line)
+                width = len(line)
             if width:
                 self._stream.write("\r" + " " * width + "\r")
                 self._stream.flush()
