@@ -47,7 +47,7 @@ def best_joins(
     second: Shadows,
     solver: Solver,
     *,
-    apart: bool = False,
+    apart: float = 0.0,
     enough: float = np.inf,
 ) -> Joins:
     """Maximise the margin over all joined pieces of pairs of sets.
@@ -57,8 +57,8 @@ def best_joins(
     first, second : Shadows
         Aligned: pair i is ``first[i]`` and ``second[i]``, held on the same edges.
     solver : Solver
-    apart : bool
-        Whether two contacts on one edge are to be kept in their order, and apart.
+    apart : float
+        As for `piece_sets`: keeps contacts of a grasp that could meet apart, and in order.
     enough : float
         No better join is looked for once one exists whose margin is larger than this.
 
@@ -88,10 +88,10 @@ class _Group:
 
     functions: tuple[TorqueFunctions, TorqueFunctions]
     names: tuple[list[str], list[str]]
-    apart: bool
+    apart: float
 
     @classmethod
-    def of(cls, first: Shadows, second: Shadows, apart: bool) -> _Group:
+    def of(cls, first: Shadows, second: Shadows, apart: float) -> _Group:
         one, other = (s.sources[s.source[0]].take(s.row) for s in (first, second))
         names = [f"f{i}" for i in range(one.m)], [f"g{i}" for i in range(other.m)]
         for here, there in zip(first.slots[0], second.slots[0], strict=True):

@@ -20,7 +20,6 @@ from regrasp_lp.friction import BoolArray, IntArray
 from regrasp_lp.grasp_sets.candidates import runs
 from regrasp_lp.planning.hand import Hand
 from regrasp_lp.shadows import Shadows, shadows
-from regrasp_lp.switching import can_switch
 from regrasp_lp.torque import TorqueFunctions
 
 STORE_LIMIT = 8_000_000
@@ -52,12 +51,12 @@ class SwitchRule:
         The stacks of sets; set numbers run through them.
     hand : Hand
     decide : callable
-        Whether aligned projections have a common point; `switching.can_switch` or LPs.
+        Whether aligned projections have a common point; `handovers.decide_held`, say.
     """
 
     sources: tuple[TorqueFunctions, ...]
     hand: Hand
-    decide: Decide = can_switch
+    decide: Decide
 
     @cached_property
     def offsets(self) -> IntArray:

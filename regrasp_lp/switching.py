@@ -22,6 +22,7 @@ from itertools import pairwise
 
 import numpy as np
 
+from regrasp_lp.errors import OptionError
 from regrasp_lp.friction import UNIT_ROUNDOFF, BoolArray, FloatArray
 from regrasp_lp.shadows import Shadows
 
@@ -41,7 +42,14 @@ def can_switch(first: Shadows, second: Shadows) -> BoolArray:
     Returns
     -------
     numpy.ndarray of bool, shape (P,)
+
+    Raises
+    ------
+    OptionError
+        If more contacts are held: there is no closed form, only a margin LP.
     """
+    if first.held > 2 and len(first) > 0:
+        raise OptionError(f"{first.held} held contacts: decide by `handovers.decide_held`")
     decide = _one_held if first.held == 1 else _two_held
     parts = [
         decide(*(s.take(np.arange(i, min(i + _CHUNK, len(first)))) for s in (first, second)))
@@ -199,12 +207,10 @@ def _covered(intervals: tuple[FloatArray, FloatArray]) -> BoolArray:
     order = np.argsort(intervals[0], axis=1)
     lower, upper = (np.take_along_axis(end, order, axis=1) for end in intervals)
     reached = np.zeros(len(lower))
-    at_start = np.zeros(len(lower), dtype=bool)
     for i in range(lower.shape[1]):
         joins = (lower[:, i] <= reached) & (upper[:, i] >= lower[:, i])
-        at_start |= joins
         reached = np.where(joins, np.maximum(reached, upper[:, i]), reached)
-    return at_start & (reached >= 1)
+    return np.asarray(reached >= 1)
 
 
 def _gaps(intervals: tuple[FloatArray, FloatArray]) -> list[FloatArray]:

@@ -210,12 +210,12 @@ class SwitchingGraph:
             return None
         contacts = self.sets.contacts
         least = self.hand.held(contacts[first], contacts[second])
-        found = [
+        every = [
             handover
             for held in range(most, least - 1, -1)
             for handover in handovers(self.sets, self._solver, first, second, held)
-            if self.options.min_margin == 0 or handover.margin > self.options.min_margin
         ]
+        found = [h for h in every if h.margin > self.options.min_margin] or every[:1]
         edges = self.sets[first].edges
         return Switch(
             first,
@@ -280,11 +280,13 @@ class SwitchingGraph:
     @cached_property
     def n_switches(self) -> int:
         """Number of adjacent pairs, those that need to hold nothing included."""
-        contacts = self.sets.contacts
-        total = 0
-        for i, j, _ in self.switches.pairs():
-            need = np.array([[self.hand.held(a, b) for b in range(4)] for a in range(4)])
-            total += int((need[contacts[i], contacts[j]] > 0).sum())
+        n, contacts = len(self), self.sets.contacts
+        need = np.array([[self.hand.held(a, b) for b in range(4)] for a in range(4)])
+        keys: IntArray = np.zeros(0, dtype=np.int64)
+        for i, j, _ in self.switches.pairs():  # on demand a pair may come again
+            explicit = need[contacts[i], contacts[j]] > 0
+            keys = np.union1d(keys, i[explicit].astype(np.int64) * n + j[explicit])
+        total = len(keys)
         two, three = int((contacts == 2).sum()), int((contacts == 3).sum())
         for pairs, a, b in (
             (two * (two - 1) // 2, 2, 2),

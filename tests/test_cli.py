@@ -20,7 +20,7 @@ import pytest
 from conftest import REPOSITORY
 
 import regrasp_lp as rl
-from regrasp_lp.cli import main, values
+from regrasp_lp.cli import _discard_output, main, values
 from regrasp_lp.cli.arguments import build_parser
 from regrasp_lp.cli.far_apart import chosen_grasp, far_apart
 from regrasp_lp.cli.progress import ProgressBar
@@ -299,9 +299,9 @@ def test_chosen_grasps_keep_the_margin_of_their_sets(stars: dict[str, rl.Polygon
 
 
 def test_digits_are_kept_where_the_margin_needs_them() -> None:
-    width = 2 / 3  # fingers have to be opposite each other to a part in 10^11
+    width = 2 / 3  # fingers have to be opposite each other to a part in 10^13
     polygon = rl.Polygon([(0, 0), (width, 0), (width, 1), (0, 1)], name="slippery")
-    graph = rl.build_switching_graph(polygon, 1e-11)
+    graph = rl.build_switching_graph(polygon, 1e-13)
     index = next(i for i, found in enumerate(graph.sets) if found.edges == (0, 2))
     grasp = chosen_grasp(graph, index)
     assert index in graph.locate(grasp)
@@ -733,7 +733,9 @@ def test_progress_is_silent_for_short_work_and_elsewhere(monkeypatch: pytest.Mon
     assert short.getvalue() == file.getvalue() == dumb.getvalue() == ""
 
 
-def test_progress_survives_a_terminal_that_goes_away() -> None:
+def test_progress_survives_a_terminal_that_goes_away(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("regrasp_lp.cli.progress._REDRAW", 0.001)
+
     class Gone(Terminal):
         def write(self, _: str) -> int:
             raise OSError(5, "Input/output error")
@@ -814,6 +816,19 @@ def test_names_that_the_terminal_cannot_write(tmp_path: Path) -> None:
     done = in_process_of_its_own("show", "odd.geojson", "--list", cwd=tmp_path, env=environment)
     assert (done.returncode, done.stderr) == (0, "")
     assert done.stdout.startswith("gr\\xf6\\xdfe: 4 edges")
+
+
+def test_output_that_cannot_be_written_is_discarded(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    with open(tmp_path / "out.txt", "w") as file:
+        monkeypatch.setattr(sys, "stdout", file)
+        print("still in the buffer")
+        _discard_output()
+        file.flush()
+    assert (tmp_path / "out.txt").read_text() == ""
+    monkeypatch.setattr(sys, "stdout", io.StringIO())
+    _discard_output()
 
 
 def test_without_standard_output(monkeypatch: pytest.MonkeyPatch) -> None:

@@ -238,7 +238,7 @@ def test_solvers_agree_on_pieces_of_grasp_sets() -> None:
         )
         pieces = existing_pieces(functions)[:200]
         for measure in ("margin", "tolerance"):
-            sets = piece_sets(functions, pieces, "abc", measure=measure, apart=True)
+            sets = piece_sets(functions, pieces, "abc", measure=measure, apart=2.0)
             one, other = (maximise_margins(sets, get_solver(s)) for s in SOLVERS)
             size = polygon.diameter
             np.testing.assert_allclose(one.margins, other.margins, atol=1e-8 * size)

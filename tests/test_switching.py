@@ -587,7 +587,7 @@ RULES = {
 
 def rule_of(name: str, fingers: int) -> SwitchRule:
     polygon, friction, sets = RULES[name]
-    return SwitchRule(existing(Cones.of(polygon, friction), sets), Hand(fingers))
+    return SwitchRule(existing(Cones.of(polygon, friction), sets), Hand(fingers), can_switch)
 
 
 def brute_switches(rule: SwitchRule) -> dict[tuple[int, int], int]:
@@ -672,7 +672,7 @@ def test_pairs_equal_a_loop_over_all_matchings(name: str) -> None:
     for fingers in (3, 4, 5, 6):
         rule = rule_of(name, fingers)
         rule = SwitchRule(
-            tuple(f.take(np.arange(min(len(f), 12))) for f in rule.sources), rule.hand
+            tuple(f.take(np.arange(min(len(f), 12))) for f in rule.sources), rule.hand, can_switch
         )
         first, second, held = rule.pairs()
         found = zip(zip(first.tolist(), second.tolist(), strict=True), held.tolist(), strict=True)
@@ -707,7 +707,7 @@ def test_chunks_of_pairs_do_not_change_the_pairs(monkeypatch: pytest.MonkeyPatch
 def test_an_object_without_sets_has_no_switches() -> None:
     stacks = existing(Cones.of(regular(5), 1e-3), "complete")
     nothing = tuple(f.take(np.zeros(0, dtype=np.intp)) for f in stacks)
-    rule = SwitchRule(nothing, Hand())
+    rule = SwitchRule(nothing, Hand(), can_switch)
     assert rule.n_pairs == 0
     assert [len(v) for v in rule.pairs()] == [0, 0, 0]
     stored = StoredSwitches.of_pairs(0, *rule.pairs())
@@ -723,7 +723,7 @@ def test_linear_programs_as_the_decider_find_the_same_pairs() -> None:
 
     for one, other in zip(
         SwitchRule(stacks, Hand(), by_programs).pairs(),
-        SwitchRule(stacks, Hand()).pairs(),
+        SwitchRule(stacks, Hand(), can_switch).pairs(),
         strict=True,
     ):
         np.testing.assert_array_equal(one, other)

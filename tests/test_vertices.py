@@ -422,7 +422,7 @@ def test_apart_keeps_the_order_on_an_edge() -> None:
     )
     pieces_ = np.array([[0, 0, 1], [1, 0, 1], [2, 0, 1]])
     together = piece_sets(functions, pieces_, ["a", "b", "c"])
-    apart = piece_sets(functions, pieces_, ["a", "b", "c"], apart=True)
+    apart = piece_sets(functions, pieces_, ["a", "b", "c"], apart=2.0)
     at = np.array([[0.5, 0.75, 0.4], [0.5, 0.25, 0.5], [0.9, 0.1, 0.5]])
     limits = np.array([(0.75 - 0.5) * 4 / 2, (0.5 - 0.25) * 4 / 2, np.inf])
     np.testing.assert_allclose(apart.margins(at), np.minimum(together.margins(at), limits))

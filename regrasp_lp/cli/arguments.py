@@ -19,8 +19,8 @@ _OVERVIEW = """\
 Plan how a hand of free-flying fingers regrasps a planar polygonal object, with
 the object in force closure at every instant.
 
-A contact is written edge:position: the number of an edge, and the distance from
-where that edge starts, in the object's unit. `show` draws the numbers."""
+A contact is written edge:position: the number of an edge, and the distance
+from where that edge starts, in the object's unit. `show` draws the numbers."""
 
 _OVERVIEW_EXAMPLES = """\
 examples:

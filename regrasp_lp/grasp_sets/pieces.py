@@ -3,15 +3,19 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from itertools import combinations
 from typing import Literal
 
 import numpy as np
 
-from regrasp_lp.friction import IntArray
+from regrasp_lp.friction import FloatArray, IntArray
 from regrasp_lp.linear_sets import LinearSets
 from regrasp_lp.torque import TorqueFunctions
 
 Measure = Literal["margin", "tolerance"]
+
+BARELY_APART = 1e-4
+"""For `piece_sets(apart=…)`: contacts that do not coincide, at next to no cost in margin."""
 
 
 def piece_sets(
@@ -20,7 +24,7 @@ def piece_sets(
     names: Sequence[str],
     *,
     measure: Measure = "margin",
-    apart: bool = False,
+    apart: float = 0.0,
 ) -> LinearSets:
     """Return pieces as linear sets over the fractions of their contacts.
 
@@ -37,9 +41,10 @@ def piece_sets(
     measure : {"margin", "tolerance"}
         With "tolerance" the rows are scaled by ``w`` instead of ``s``, and ``u_i >= ε``,
         ``u_i <= l_i - ε`` are rows too.
-    apart : bool
-        Whether two contacts on one edge are kept in order and apart: a row
-        ``u_{i+1} - u_i >= 2 ε``, for all pieces (void where the edges differ).
+    apart : float
+        If positive, any two contacts that could meet are this many ε apart, measured along the
+        boundary: two on one edge, which then keep their order, or on edges with a common vertex.
+        A row per pair of contacts, void where they cannot meet.
 
     Returns
     -------
@@ -58,18 +63,35 @@ def piece_sets(
         rows = np.concatenate((rows, -ends, ends), axis=1)
         bounds = np.concatenate((bounds, np.zeros((count, m)), lengths), axis=1)
         scales = np.concatenate((scales, np.ones((count, 2 * m))), axis=1)
-    if apart:
-        edges = functions.edges[row]
-        order = np.zeros((count, m - 1, m))
-        for i in range(m - 1):
-            same = edges[:, i] == edges[:, i + 1]
-            order[:, i, i] = np.where(same, lengths[:, i], 0.0)
-            order[:, i, i + 1] = -order[:, i, i]
-        void = (order == 0).all(axis=2)
-        rows = np.concatenate((rows, order), axis=1)
-        bounds = np.concatenate((bounds, np.where(void, lengths.max(axis=1)[:, None], 0)), axis=1)
-        scales = np.concatenate((scales, np.where(void, 0.0, 2.0)), axis=1)
+    if apart > 0:
+        away, least = _apart(functions, row)
+        void = (away == 0).all(axis=2)
+        rows = np.concatenate((rows, away), axis=1)
+        bounds = np.concatenate((bounds, least), axis=1)
+        scales = np.concatenate((scales, np.where(void, 0.0, apart)), axis=1)
     return LinearSets(tuple(names), rows, scales, bounds, np.zeros((count, m)), np.ones((count, m)))
+
+
+def _apart(functions: TorqueFunctions, row: IntArray) -> tuple[FloatArray, FloatArray]:
+    """Rows and bounds of ``u_i - u_j <= 0`` on one edge, ``u_i - u_j <= l_i`` round a vertex.
+
+    For every pair i < j of contacts: j follows i on its edge or around the end of it, or i
+    follows j around the end of that one.
+    """
+    starts, ends = functions.cones.starts, functions.cones.ends
+    edges, lengths = functions.edges[row], functions.lengths[row]
+    pairs = list(combinations(range(functions.m), 2))
+    rows = np.zeros((len(row), len(pairs), functions.m))
+    bounds = np.tile(lengths.max(axis=1)[:, None], len(pairs))
+    for n, (i, j) in enumerate(pairs):
+        same = edges[:, i] == edges[:, j]
+        for one, other in ((i, j), (j, i)):
+            meet = (ends[edges[:, one]] == starts[edges[:, other]]).all(axis=1)
+            meet |= same & (one < other)
+            rows[meet, n, one] = lengths[meet, one]
+            rows[meet, n, other] = -lengths[meet, other]
+            bounds[meet, n] = np.where(same, 0.0, lengths[:, one])[meet]
+    return rows, bounds
 
 
 def in_positions(sets: LinearSets, lengths: Sequence[float]) -> LinearSets:

@@ -16,7 +16,7 @@ import numpy as np
 
 from regrasp_lp.errors import SolverError
 from regrasp_lp.friction import FloatArray, IntArray
-from regrasp_lp.grasp_sets.pieces import piece_sets
+from regrasp_lp.grasp_sets.pieces import BARELY_APART, piece_sets
 from regrasp_lp.lp import Solver, maximise_margins
 from regrasp_lp.margins import existing_pieces
 from regrasp_lp.torque import TorqueFunctions
@@ -48,7 +48,7 @@ class PieceChains:
     def overlaps(self) -> tuple[FloatArray, FloatArray]:
         """Largest margin in the overlap of two pieces, and where: shapes (P, P) and (P, P, m)."""
         count, m = len(self.pieces), self.functions.m
-        sets = piece_sets(self.functions, self.pieces, _NAMES[:m], apart=True)
+        sets = piece_sets(self.functions, self.pieces, _NAMES[:m], apart=BARELY_APART)
         one, other = np.triu_indices(count, 1)
         solution = maximise_margins(
             sets.take(one).join(sets.take(other), on=_NAMES[:m]), self.solver
@@ -109,7 +109,7 @@ class PieceChains:
 
 def middles(functions: TorqueFunctions, pieces: IntArray, solver: Solver) -> FloatArray:
     """Return a grasp of largest tolerance of each of some pieces of one set, shape (P, m)."""
-    sets = piece_sets(functions, pieces, _NAMES[: functions.m], measure="tolerance", apart=True)
+    sets = piece_sets(functions, pieces, _NAMES[: functions.m], measure="tolerance", apart=2.0)
     return maximise_margins(sets, solver).points
 
 

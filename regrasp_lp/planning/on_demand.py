@@ -12,6 +12,7 @@ are listed from these pairs.
 from __future__ import annotations
 
 from dataclasses import dataclass, field
+from functools import partial
 
 import numpy as np
 
@@ -20,6 +21,7 @@ from regrasp_lp.friction import Cones, FloatArray, IntArray, spanning
 from regrasp_lp.grasp_sets.candidates import runs
 from regrasp_lp.grasp_sets.collection import GraspSets
 from regrasp_lp.grasp_sets.vertices import solve_family
+from regrasp_lp.handovers import decide_held
 from regrasp_lp.lp import Solver
 from regrasp_lp.margins import best_pieces
 from regrasp_lp.planning.hand import Hand
@@ -62,7 +64,8 @@ def problem_on_demand(
         families.append(solve_family(kind, functions, np.full(len(edges), -1), solver))
     sets = GraspSets(polygon, tuple(families))
     hand = Hand(4)
-    switches = StoredSwitches.of_pairs(len(sets), *SwitchRule(sets.sources, hand).pairs())
+    switch_rule = SwitchRule(sets.sources, hand, partial(decide_held, solver=solver))
+    switches = StoredSwitches.of_pairs(len(sets), *switch_rule.pairs())
     return PlanningProblem(sets, switches, hand, cones.friction, solver)
 
 

@@ -111,7 +111,7 @@ def build_path_problem(
         nodes = [(n, p) for n, p in nodes if (ids[n] >= 0).all()]
         names = [f"f{i}" for i in range(ids.shape[1])]
         pieces = stage.pieces[[p for _, p in nodes]].reshape(-1, 3)
-        sets = piece_sets(stage.functions, pieces, names, measure="tolerance", apart=True)
+        sets = piece_sets(stage.functions, pieces, names, measure="tolerance", apart=2.0)
         for i, (node, _) in enumerate(nodes):
             used = sets.scales[i] > 0
             for row, bound, scale in zip(
