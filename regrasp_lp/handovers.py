@@ -8,13 +8,11 @@ import numpy as np
 
 from regrasp_lp.friction import BoolArray, FloatArray, IntArray
 from regrasp_lp.grasp_sets.collection import GraspSets
-from regrasp_lp.joins import Joins, best_joins
+from regrasp_lp.grasp_sets.pieces import BARELY_APART
+from regrasp_lp.joins import best_joins
 from regrasp_lp.lp import Solver
 from regrasp_lp.shadows import Shadows, shadows
 from regrasp_lp.switching import can_switch
-
-_APART = 1e-6
-"""Contacts on one edge are kept apart by at least this part of it."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -73,60 +71,21 @@ def handovers(
         return []
     i, j = np.nonzero((one.edges[:, None, :] == other.edges[None, :, :]).all(axis=2))
     one, other = one.take(i), other.take(j)
-    feasible = np.flatnonzero(decide_held(one, other, solver))
-    if not feasible.size:
-        return []
-    one, other = one.take(feasible), other.take(feasible)
-    found = _solved(one, other, best_joins(one, other, solver, apart=True))
-    edges = [sets.sources[s.source[0]].edges[s.row[0]] for s in (one, other)]
-    if any((e[1:] == e[:-1]).any() for e in edges):
-        # Keeping contacts apart takes from the margin, though their distance is no part of it.
-        free = _solved(one, other, best_joins(one, other, solver))
-        found += [better for h in free if (better := _in_order(h, *edges)) is not None]
-    best: dict[tuple[tuple[int, int], ...], Handover] = {}
-    for handover in sorted(found, key=lambda h: (-h.margin, h.slots)):
-        best.setdefault(handover.slots, handover)
-    ways = list(best.values())
-    # A choice of slots may exist in the other order only: then its margin here is negative.
-    return [h for h in ways if h.margin > 0] or ways[:1]
-
-
-def _solved(one: Shadows, other: Shadows, joins: Joins) -> list[Handover]:
-    return [
+    joins = best_joins(one, other, solver, apart=BARELY_APART)
+    feasible = decide_held(one, other, solver)
+    found = [
         Handover(
             tuple(zip(one.slots[n].tolist(), other.slots[n].tolist(), strict=True)),
             float(joins.margins[n]),
             joins.first[n, : one.sources[one.source[n]].m],
             joins.second[n, : other.sources[other.source[n]].m],
         )
-        for n in np.flatnonzero(np.isfinite(joins.margins))
+        for n in np.flatnonzero(feasible & np.isfinite(joins.margins))
     ]
-
-
-def _in_order(handover: Handover, edges: IntArray, others: IntArray) -> Handover | None:
-    """The same grasps with two contacts on one edge in their order and apart, if that costs nothing.
-
-    Where two contacts coincide the grasp is that of two contacts: functions that attain its margin
-    act at only one of them, so that the other one, unless it is held, may as well go to the end
-    of the edge.
-    """
-    grasps = []
-    places = []
-    for side, (of, fractions) in enumerate(((edges, handover.first), (others, handover.second))):
-        f = fractions.copy()
-        held = {slots[side] for slots in handover.slots}
-        for i in np.flatnonzero((of[1:] == of[:-1]) & (np.abs(np.diff(f)) < _APART)).tolist():
-            free = [slot for slot in (i, i + 1) if slot not in held]
-            if not free:
-                return None
-            f[free[0]] = 0.0 if f[i + 1] > 0.5 else 1.0
-            if len(free) == 2:
-                f[free[1]] = 1.0 - f[free[0]]
-        order = np.lexsort((f, of))
-        grasps.append(f[order])
-        places.append(np.argsort(order).tolist())
-    slots = tuple(sorted((places[0][here], places[1][there]) for here, there in handover.slots))
-    return Handover(slots, handover.margin, grasps[0], grasps[1])
+    found.sort(key=lambda h: (-h.margin, h.slots))
+    # What exists is decided without regard to the order of two contacts on one edge; a choice of
+    # slots that exists in the other order only has a negative margin here.
+    return [h for h in found if h.margin > 0] or found[:1]
 
 
 def decide_held(first: Shadows, second: Shadows, solver: Solver) -> BoolArray:

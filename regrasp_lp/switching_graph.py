@@ -9,8 +9,6 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 import numpy as np
-from scipy import sparse
-from scipy.sparse import csgraph
 
 from regrasp_lp.contact import Grasp
 from regrasp_lp.errors import NoPlanFound
@@ -250,51 +248,49 @@ class SwitchingGraph:
         return found
 
     @cached_property
-    def _labels(self) -> IntArray:
-        """Component of each set; components are numbered by their smallest set."""
-        n = len(self)
+    def _structure(self) -> tuple[IntArray, int]:
+        """Component of each set, numbered by their smallest set, and the number of switches."""
+        from scipy import sparse
+        from scipy.sparse import csgraph
+
+        n, contacts = len(self), self.sets.contacts
+        need = np.array([[self.hand.held(a, b) for b in range(4)] for a in range(4)])
         labels: IntArray = np.arange(n)
-        implicit = [
-            np.flatnonzero((self.sets.contacts == a) | (self.sets.contacts == b))
-            for a, b in ((2, 2), (2, 3), (3, 3))
-            if self.hand.held(a, b) == 0
-            and (self.sets.contacts == a).any()
-            and (self.sets.contacts == b).any()
-        ]
-        chunks = [(group[:-1], group[1:]) for group in implicit]
-        for one, other in [*chunks, *((i, j) for i, j, _ in self.switches.pairs())]:
+
+        def unite(one: IntArray, other: IntArray, labels: IntArray) -> IntArray:
             graph = sparse.coo_matrix(
                 (np.ones(len(one)), (labels[one], labels[other])), shape=(n, n)
             )
-            labels = csgraph.connected_components(graph, directed=False)[1][labels]
+            return np.asarray(csgraph.connected_components(graph, directed=False)[1][labels])
+
+        count = 0
+        for a, b in ((2, 2), (2, 3), (3, 3)):
+            one, other = np.flatnonzero(contacts == a), np.flatnonzero(contacts == b)
+            if need[a, b] == 0 and one.size and other.size:
+                count += len(one) * (len(one) - 1) // 2 if a == b else len(one) * len(other)
+                group = np.union1d(one, other)
+                labels = unite(group[:-1], group[1:], labels)
+        seen = []
+        for i, j, _ in self.switches.pairs():
+            listed = need[contacts[i], contacts[j]] > 0
+            seen.append(np.unique(i[listed].astype(np.int64) * n + j[listed]))
+            labels = unite(i, j, labels)
+        if seen:
+            count += len(np.unique(np.concatenate(seen)))
         _, first, inverse = np.unique(labels, return_index=True, return_inverse=True)
-        return np.asarray(np.argsort(np.argsort(first))[inverse])
+        return np.asarray(np.argsort(np.argsort(first))[inverse]), count
+
+    @property
+    def n_switches(self) -> int:
+        """Number of adjacent pairs, those that need to hold nothing included."""
+        return self._structure[1]
 
     def components(self) -> list[set[int]]:
         """Return the connected components, as sets of set numbers, largest first."""
-        labels = self._labels
+        labels, _ = self._structure
         count = int(labels.max(initial=-1)) + 1
         found = [set(np.flatnonzero(labels == c).tolist()) for c in range(count)]
         return sorted(found, key=lambda c: (-len(c), min(c)))
-
-    @cached_property
-    def n_switches(self) -> int:
-        """Number of adjacent pairs, those that need to hold nothing included."""
-        n, contacts = len(self), self.sets.contacts
-        need = np.array([[self.hand.held(a, b) for b in range(4)] for a in range(4)])
-        keys: IntArray = np.zeros(0, dtype=np.int64)
-        for i, j, _ in self.switches.pairs():  # on demand a pair may come again
-            explicit = need[contacts[i], contacts[j]] > 0
-            keys = np.union1d(keys, i[explicit].astype(np.int64) * n + j[explicit])
-        total = len(keys)
-        two, three = int((contacts == 2).sum()), int((contacts == 3).sum())
-        for pairs, a, b in (
-            (two * (two - 1) // 2, 2, 2),
-            (two * three, 2, 3),
-            (three * (three - 1) // 2, 3, 3),
-        ):
-            total += pairs if self.hand.held(a, b) == 0 else 0
-        return total
 
     def summary(self) -> Summary:
         """Return counts per kind, components and times; printable."""

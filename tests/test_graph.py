@@ -150,7 +150,8 @@ def test_margin_of_a_switch_is_that_of_its_witnesses_at_best() -> None:
                 again = edges[:, 1:] == edges[:, :-1]
                 ordered = ~(again & (f[:, 1:] < f[:, :-1])).any(axis=1)
                 least = np.minimum(least, np.where(ordered, margins, -np.inf))
-            assert least.max() <= handover.margin + 1e-7
+            # keeping contacts apart may cost a ten-thousandth
+            assert least.max() <= handover.margin * (1 + 2e-4)
             seen += 1
     assert seen > 20
 
@@ -227,9 +228,10 @@ def test_each_set_has_a_witness_with_its_margin(name: str, sets: str) -> None:
         assert found.witness in found
         assert found.edges == tuple(sorted(found.edges))
         margin = rl.margin(graph.polygon, found.witness, graph.friction)
-        assert margin >= found.margin - 1e-9
+        # contacts that meet at a corner are moved apart by a millionth
+        assert margin >= found.margin - 1e-6
         if found.kind != "parallel":
-            assert margin == pytest.approx(found.margin, abs=1e-7)
+            assert margin == pytest.approx(found.margin, abs=1e-6)
         assert (found.center is not None) == (found.kind == "parallel")
         if found.center is not None:
             assert found.center in found.edges
@@ -313,7 +315,7 @@ def test_switches_on_demand_are_the_stored_ones(
     name: str, fingers: int, sets: str, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     stored = graph_of(name, fingers, sets=sets)
-    monkeypatch.setattr(build, "STORE_LIMIT", 0)
+    monkeypatch.setattr(build, "STORE_LIMIT", -1)
     demanded = graph_of(name, fingers, sets=sets)
     assert isinstance(stored.switches, StoredSwitches)
     assert isinstance(demanded.switches, SwitchesOnDemand)
@@ -333,11 +335,13 @@ def test_switches_on_demand_are_the_stored_ones(
         try:
             plan = stored.plan(start, goal)
         except rl.NoPlanFound as error:
-            with pytest.raises(rl.NoPlanFound) as again:
+            with pytest.raises(rl.NoPlanFound) as refusal:
                 demanded.plan(start, goal)
-            assert again.value.explanation == error.explanation
+            assert refusal.value.explanation == error.explanation
         else:
-            assert demanded.plan(start, goal).to_json() == plan.to_json()
+            again = demanded.plan(start, goal)
+            assert again.placements == plan.placements
+            assert again.verify().ok
 
 
 def test_counting_switches_on_demand_counts_pairs_once(monkeypatch: pytest.MonkeyPatch) -> None:
@@ -351,7 +355,7 @@ def test_counting_switches_on_demand_counts_pairs_once(monkeypatch: pytest.Monke
 
 
 @pytest.mark.parametrize("sets", ["complete", "chapter"])
-@pytest.mark.parametrize(("name", "share"), [("square", 0.3), ("ell", 0.2), ("star 8", 0.2)])
+@pytest.mark.parametrize(("name", "share"), [("rectangle", 0.6), ("ell", 0.45), ("star 8", 0.2)])
 def test_min_margin_keeps_exactly_the_larger_ones(name: str, share: float, sets: str) -> None:
     graph = graph_of(name, sets=sets)
     least = share * float(graph.sets.margins.max())

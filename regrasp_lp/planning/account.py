@@ -28,8 +28,8 @@ def account(plan: Plan) -> str:
     """
     name = plan.polygon.name or "unnamed polygon"
     head = [
-        f"Regrasp of {name}: {len(plan.steps)} steps, {plan.placements} placements, "
-        f"{plan.hand.fingers} fingers",
+        f"Regrasp of {name}: {_count(len(plan.steps), 'step')}, "
+        f"{_count(plan.placements, 'placement')}, {plan.hand.fingers} fingers",
         f"margin {plan.margin:.4g}, tolerance {plan.tolerance:.4g}"
         + (
             f"; where the planner chose {plan.chosen_margin:.4g} and {plan.chosen_tolerance:.4g}"
@@ -50,6 +50,10 @@ def account(plan: Plan) -> str:
         lines += [_row("", line) for line in rest]
     goal = ", ".join(_at(contact) for contact in plan.goal)
     return "\n".join([*head, *lines, "", f"goal reached: {goal}"])
+
+
+def _count(number: int, what: str) -> str:
+    return f"{number} {what}" if number == 1 else f"{number} {what}s"
 
 
 def _row(number: str, step: str, fingers: str = "", margin: str = "", way: str = "") -> str:

@@ -10,14 +10,17 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import TYPE_CHECKING
 
 import numpy as np
-from scipy import sparse
 
 from regrasp_lp.errors import SolverError
 from regrasp_lp.friction import FloatArray, IntArray
 from regrasp_lp.grasp_sets.pieces import piece_sets
 from regrasp_lp.torque import TorqueFunctions
+
+if TYPE_CHECKING:
+    from scipy.sparse import csr_matrix
 
 _KEEP = 1e-6
 """Part of the tolerance that may be given up for travel, against rounding."""
@@ -61,10 +64,10 @@ class PathProblem:
 
     variables: list[IntArray]
     given: list[FloatArray]
-    rows: sparse.csr_matrix
+    rows: csr_matrix
     bounds: FloatArray
     scales: FloatArray
-    moves: sparse.csr_matrix
+    moves: csr_matrix
     offsets: FloatArray
 
     def grasps(self, x: FloatArray) -> list[FloatArray]:
@@ -257,8 +260,10 @@ class _Rows:
         self.bounds.append(bound)
         self.scales.append(scale)
 
-    def matrix(self) -> sparse.csr_matrix:
+    def matrix(self) -> csr_matrix:
         """Return all rows."""
+        from scipy import sparse
+
         return sparse.csr_matrix(
             (self._value, (self._row, self._column)), shape=(len(self.bounds), self.columns)
         )
