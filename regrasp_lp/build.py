@@ -7,7 +7,7 @@ import time
 import numpy as np
 from numpy.typing import ArrayLike
 
-from regrasp_lp.errors import OptionError
+from regrasp_lp.errors import HandError, OptionError
 from regrasp_lp.friction import BoolArray, Cones
 from regrasp_lp.grasp_sets.collection import GraspSets
 from regrasp_lp.grasp_sets.vertices import Progress, build_family, kinds_of
@@ -84,7 +84,7 @@ def build_switching_graph(
     """
     kinds = kinds_of(sets)
     backend = get_solver(solver)
-    hand = Hand() if hand is None else hand
+    hand = _checked_hand(hand)
     if switching != "contact":
         raise OptionError(f'switching must be "contact", got {switching!r}')
     if not (np.isfinite(min_margin) and min_margin >= 0):
@@ -110,6 +110,14 @@ def build_switching_graph(
     seconds["switches"] = time.perf_counter() - started
     options = GraphOptions(sets, switching, float(min_margin), solver, presolve)
     return SwitchingGraph(grasp_sets, switches, cones.friction, hand, options, seconds)
+
+
+def _checked_hand(hand: Hand | None) -> Hand:
+    if hand is None:
+        return Hand()
+    if not isinstance(hand, Hand):
+        raise HandError(f"hand must be a Hand, got {hand!r}: use Hand(fingers=k)")
+    return hand
 
 
 def switch_rule(
@@ -162,7 +170,7 @@ def plan_regrasp(
         As for `SwitchingGraph.plan`.
     """
     check_aligning(aligning)
-    hand = Hand() if hand is None else hand
+    hand = _checked_hand(hand)
     cones = Cones.of(polygon, friction)
     first, last = (
         checked_grasp(polygon, grasp, cones.friction, hand, role)

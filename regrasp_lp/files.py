@@ -5,6 +5,7 @@ Writers replace a file in one step, so that no reader ever sees half of one.
 
 from __future__ import annotations
 
+import errno
 import json
 import os
 import secrets
@@ -103,6 +104,8 @@ def write_atomically(path: str | os.PathLike[str], content: str | bytes) -> None
     'held'
     """
     target = Path(os.path.realpath(path))
+    if not target.parent.is_dir():
+        raise FileNotFoundError(errno.ENOENT, "there is no such folder", str(target.parent))
     temporary = target.with_name(f".{target.name}.{secrets.token_hex(8)}.tmp")
     try:
         with open(temporary, "xb") as file:

@@ -14,15 +14,13 @@ from __future__ import annotations
 from dataclasses import dataclass
 from fractions import Fraction
 from functools import cached_property
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from regrasp_lp.errors import FrictionError
-
-if TYPE_CHECKING:
-    from regrasp_lp.polygon import Polygon
+from regrasp_lp.errors import FrictionError, PolygonError
+from regrasp_lp.polygon import Polygon
 
 FloatArray = NDArray[np.float64]
 IntArray = NDArray[np.integer[Any]]
@@ -110,7 +108,17 @@ class Cones:
 
     @classmethod
     def of(cls, polygon: Polygon, friction: ArrayLike) -> Cones:
-        """Return the cones of the edges of `polygon` under `friction`."""
+        """Return the cones of the edges of `polygon` under `friction`.
+
+        Raises
+        ------
+        PolygonError
+            If `polygon` is not a `Polygon`.
+        FrictionError
+            As `per_edge_friction`.
+        """
+        if not isinstance(polygon, Polygon):
+            raise PolygonError(f"expected a Polygon, got {type(polygon).__name__}: Polygon(points)")
         return cls(
             polygon.edge_starts,
             polygon.edge_ends,

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import io
 import json
+import struct
 import zipfile
 import zlib
 from dataclasses import asdict
@@ -33,7 +34,16 @@ from regrasp_lp.torque import torque_functions
 FORMAT, VERSION = "regrasp-graph", 1
 
 # What numpy, zipfile, zlib and json raise on a file that is none, or not whole.
-_DAMAGED = (ValueError, KeyError, EOFError, zipfile.BadZipFile, zlib.error, AttributeError)
+_DAMAGED = (
+    ValueError,
+    KeyError,
+    EOFError,
+    OSError,
+    RuntimeError,  # a method of compression or encryption that does not exist
+    struct.error,
+    zipfile.BadZipFile,
+    zlib.error,
+)
 
 
 def save_graph(graph: SwitchingGraph, path: str | Path) -> None:
@@ -92,11 +102,15 @@ def load_graph(path: str | Path) -> SwitchingGraph:
         If the file cannot be read, is damaged, of another format or of another version.
     """
     try:
-        with np.load(path, allow_pickle=False) as archive:
-            arrays = {name: archive[name] for name in archive.files}
-        header = json.loads(arrays["header"].tobytes())
+        content = Path(path).read_bytes()
     except OSError as error:
         raise FileFormatError(f"{path}: cannot be read: {error}") from error
+    try:
+        if not zipfile.is_zipfile(io.BytesIO(content)):
+            raise ValueError("it is no .npz archive")
+        with np.load(io.BytesIO(content), allow_pickle=False) as archive:
+            arrays = {name: archive[name] for name in archive.files}
+        header = json.loads(arrays["header"].tobytes())
     except _DAMAGED as error:
         raise FileFormatError(f"{path}: not a graph file, or damaged: {error}") from error
     if not isinstance(header, dict) or header.get("format") != FORMAT:
@@ -113,10 +127,14 @@ def load_graph(path: str | Path) -> SwitchingGraph:
 
 
 def _graph(header: dict[str, Any], arrays: dict[str, np.ndarray]) -> SwitchingGraph:
+    _check_names(set(arrays), kinds_of(header["options"]["sets"]))
     rings = np.split(arrays["vertices"], np.cumsum(arrays["ring_sizes"])[:-1])
     polygon = Polygon(rings[0], rings[1:], header["name"])
     cones = Cones.of(polygon, arrays["friction"])
     options = GraphOptions(**header["options"])
+    get_solver(options.solver)
+    if header["options"] != asdict(options) or not isinstance(header["seconds"], dict):
+        raise ValueError("the header is not complete")
     families = tuple(
         _family(cones, kind, count, arrays)
         for kind, count in zip(kinds_of(options.sets), header["candidates"], strict=True)
@@ -140,6 +158,14 @@ def _graph(header: dict[str, Any], arrays: dict[str, np.ndarray]) -> SwitchingGr
     return SwitchingGraph(sets, switches, cones.friction, hand, options, header["seconds"])
 
 
+def _check_names(names: set[str], kinds: tuple[str, ...]) -> None:
+    expected = {"header", "ring_sizes", "vertices", "friction"}
+    expected |= {f"{k}.{n}" for k in kinds for n in ("edges", "centers", "margins", "witnesses")}
+    switches = {f"switches.{n}" for n in ("starts", "others", "held")}
+    if names not in (expected, expected | switches):
+        raise ValueError(f"unknown or missing arrays: {sorted(names ^ (expected | switches))}")
+
+
 def _family(cones: Cones, kind: str, candidates: int, arrays: dict[str, np.ndarray]) -> Family:
     edges, centers, margins, witnesses = (
         arrays[f"{kind}.{name}"] for name in ("edges", "centers", "margins", "witnesses")
@@ -148,6 +174,10 @@ def _family(cones: Cones, kind: str, candidates: int, arrays: dict[str, np.ndarr
     if not (
         edges.shape == witnesses.shape == (len(edges), m)
         and centers.shape == margins.shape == (len(edges),)
+        and edges.dtype.kind == centers.dtype.kind == "i"
+        and ((centers >= -1) & (centers < cones.n_edges)).all()
+        and np.isfinite(margins).all()
+        and ((witnesses >= 0) & (witnesses <= 1)).all()
         and ((edges >= 0) & (edges < cones.n_edges)).all()
     ):
         raise ValueError(f"the arrays of the {kind} sets do not fit together")
@@ -163,7 +193,10 @@ def _stored(n: int, starts: np.ndarray, others: np.ndarray, held: np.ndarray) ->
         starts.shape == (n + 1,)
         and others.shape == held.shape == (int(starts[-1]),)
         and (np.diff(starts) >= 0).all()
+        and starts[0] == 0
         and ((others >= 0) & (others < n)).all()
+        and ((held >= 1) & (held <= 3)).all()
+        and starts.dtype.kind == others.dtype.kind == held.dtype.kind == "i"
     ):
         raise ValueError("the arrays of the switches do not fit together")
     return StoredSwitches(starts, others, held)

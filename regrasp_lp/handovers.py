@@ -6,6 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from regrasp_lp.errors import SolverError
 from regrasp_lp.friction import BoolArray, FloatArray, IntArray
 from regrasp_lp.grasp_sets.collection import GraspSets
 from regrasp_lp.grasp_sets.pieces import BARELY_APART
@@ -26,7 +27,7 @@ class Handover:
         in ascending order of their edges, two on one edge in their order along it.
     margin : float
         The largest margin that both grasps can have at once, their contacts not coinciding (for
-        which a ten-thousandth of it may be given up).
+        which a thousandth of it may be given up).
     first, second : numpy.ndarray, shape (m,)
         Fractions of such grasps, equal in the held contacts.
     """
@@ -62,6 +63,11 @@ def handovers(
     -------
     list of Handover
         The largest margin first.
+
+    Raises
+    ------
+    SolverError
+        If the switch exists only within rounding.
     """
     if held == 0:
         margin = float(min(sets.margins[first], sets.margins[second]))
@@ -82,6 +88,11 @@ def handovers(
         )
         for n in np.flatnonzero(feasible & np.isfinite(joins.margins))
     ]
+    if feasible.any() and not found:
+        raise SolverError(
+            f"the switch between the sets on edges {sets[first].edges} and {sets[second].edges} "
+            "exists, but is thinner than rounding: no margin LP can find its grasps"
+        )
     found.sort(key=lambda h: (-h.margin, h.slots))
     # What exists is decided without regard to the order of two contacts on one edge; a choice of
     # slots that exists in the other order only has a negative margin here.

@@ -69,6 +69,10 @@ class LinearSets:
         if len(set(self.names)) != n:
             raise OptionError(f"coordinate names must differ, got {self.names}")
 
+    def __repr__(self) -> str:
+        b, r, _ = self.rows.shape
+        return f"<{b} LinearSets over {', '.join(self.names)}: {r} rows · x + scales ε <= bounds>"
+
     def __len__(self) -> int:
         return len(self.rows)
 

@@ -379,7 +379,7 @@ the edge is 4.0 long, positions run from 0 to that
                 raise ContactError(
                     f"point {k}, ({given[k, 0]:.12g}, {given[k, 1]:.12g}), is {row[nearest]:.6g} "
                     f"from the boundary of {self._phrase} (nearest is edge {nearest}); the "
-                    f"tolerance is {tolerance:g}"
+                    f"tolerance is {tolerance:g} (pass tolerance=… to accept more)"
                 )
             edge = int(np.argmax(row <= row[nearest] + tie))
             contacts.append(Contact.at_fraction(edge, float(fractions[k, edge])))

@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from regrasp_lp.contact import Contact, Grasp
-from regrasp_lp.errors import FrictionError
+from regrasp_lp.errors import ContactError, FrictionError
 from regrasp_lp.force_closure import resolve_batch
 from regrasp_lp.friction import Cones, FloatArray
 from regrasp_lp.polygon import Polygon
@@ -145,6 +145,8 @@ def _measure(
         raise FrictionError("friction is missing: pass one positive number or one per edge")
     cones = Cones.of(polygon, friction)
     if grasp is not None:
+        if edges is not None or positions is not None or fractions is not None:
+            raise ContactError("pass either a grasp or arrays (edges=..., positions=...), not both")
         resolved = polygon.resolve(grasp)
         functions = torque_functions(cones, resolved.edges[None, :])
         return float(of(functions, resolved.fractions[None, :])[0])

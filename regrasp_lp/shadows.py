@@ -70,16 +70,6 @@ class Shadows:
             edges[mine] = np.take_along_axis(functions.edges[self.row[mine]], self.slots[mine], 1)
         return edges
 
-    @cached_property
-    def doubled(self) -> BoolArray:
-        """Whether the set has two contacts on one edge, shape (R,)."""
-        doubled = np.zeros(len(self), dtype=bool)
-        for number, functions in enumerate(self.sources):
-            mine = self.source == number
-            edges = functions.edges[self.row[mine]]
-            doubled[mine] = (edges[:, 1:] == edges[:, :-1]).any(axis=1)
-        return doubled
-
     def take(self, rows: IntArray) -> Shadows:
         """Return some of the projections (repetitions allowed)."""
         return Shadows(

@@ -61,6 +61,10 @@ class Switch:
     grasps: tuple[tuple[Grasp, Grasp], ...]
     handovers: tuple[Handover, ...]
 
+    def __repr__(self) -> str:
+        ways = ", ".join(str(edges) for edges in self.edges)
+        return f"<Switch {self.first} to {self.second}: hold {ways}; margin {self.margin:.4g}>"
+
     @property
     def held(self) -> int:
         """The largest number of contacts that can be held."""
@@ -139,10 +143,8 @@ class SwitchingGraph:
             and self.options == other.options
             and [f.kind for f in self.sets.families] == [f.kind for f in other.sets.families]
         )
-        return same and all(
-            np.array_equal(mine, theirs)
-            for mine, theirs in zip(self._arrays(), other._arrays(), strict=True)
-        )
+        mine, theirs = self._arrays(), other._arrays()
+        return same and len(mine) == len(theirs) and all(map(np.array_equal, mine, theirs))
 
     __hash__ = None  # type: ignore[assignment]
 

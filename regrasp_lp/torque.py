@@ -165,6 +165,25 @@ class TorqueFunctions:
         f = np.broadcast_to(fractions, self.edges.shape)
         return np.asarray(self.offsets + np.einsum("njm,nm->nj", self.slopes, f))
 
+    def certain_values(self, fractions: FloatArray) -> FloatArray:
+        """Return `values`, with those within rounding of 0 taken from rationals: no wrong sign."""
+        f = np.broadcast_to(np.asarray(fractions, dtype=np.float64), self.edges.shape)
+        values = self.values(f)
+        rows, columns = np.nonzero(self.valid & (np.abs(values) <= self.errors))
+        if rows.size:
+            numerators, unit = as_integers(f[rows])
+            constant, slopes = self._exact_coefficients(rows, columns)
+            totals = unit * constant + (slopes * numerators).sum(axis=1)
+            # Exact functions are scaled by a factor of their own, which any slope reveals.
+            known = self.slopes[rows, columns].argmax(axis=1)
+            every = np.arange(len(rows))
+            parts = [
+                float(Fraction(int(total), int(unit * slope)))
+                for total, slope in zip(totals, slopes[every, known], strict=True)
+            ]
+            values[rows, columns] = np.array(parts) * self.slopes[rows, columns, known]
+        return values
+
     def margins(self, fractions: FloatArray) -> FloatArray:
         """Return the margin of one grasp on each combination.
 
@@ -180,7 +199,7 @@ class TorqueFunctions:
         -------
         numpy.ndarray, shape (N,)
         """
-        return self._least(self.values(fractions))
+        return self._least(self.certain_values(fractions))
 
     def tolerances(self, fractions: FloatArray) -> FloatArray:
         """Return the tolerance of one grasp on each combination.
@@ -199,7 +218,7 @@ class TorqueFunctions:
         """
         f = np.broadcast_to(fractions, self.edges.shape)
         to_ends = (np.minimum(f, 1 - f) * self.lengths).min(axis=1)
-        return np.asarray(np.minimum(self._least(self.values(f) / self.rates), to_ends))
+        return np.asarray(np.minimum(self._least(self.certain_values(f) / self.rates), to_ends))
 
     def _least(self, values: FloatArray) -> FloatArray:
         up = np.where(self.valid, values, -np.inf).max(axis=1, initial=-np.inf)

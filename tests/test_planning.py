@@ -141,8 +141,8 @@ def test_many_random_plans(seed: int) -> None:
 CORPUS = (
     ("tool_icons", 30),
     ("glyphs", 60),
-    ("gears", 40),
-    ("laser_cut_parts", 30),
+    ("simplified", 40),
+    ("laser_cut_parts", 60),
     ("pushing", 60),
     ("countries", 40),
 )
@@ -281,9 +281,7 @@ def test_regripping_from_the_border_takes_few_moves() -> None:
     plan = graph.plan(start, goal, "regrip")
     assert plan.placements < 100
     assert plan.verify().ok
-    start, goal = (
-        [(0, 0.25 + x), (2, 3.75 - x - 1.0 + 1e-9)] for x in (0.0, 2.0)
-    )
+    start, goal = ([(0, 0.25 + x), (2, 3.75 - x - 1.0 + 1e-9)] for x in (0.0, 2.0))
     assert 0 < rl.margin(rectangle(), start, 0.5) < 1e-8
     assert 0 < rl.margin(rectangle(), goal, 0.5) < 1e-8
     plan = graph.plan(start, goal, "regrip")
@@ -440,7 +438,7 @@ def plans(start: object, goal: object, friction: object = 0.4) -> list[object]:
         ([(0, 4.0), (1, 0.0), (2, 2.0)], rl.ContactError, "one point.*edge 0 at 4 and edge 1 at 0"),
         ([(3, 2.0), (0, 0.0), (2, 2.0)], rl.ContactError, "one point"),
         ([(0, 1.0), (1, 1.0)], rl.NotForceClosureError, "not in force closure"),
-        ([(0, 1.0), (2, 1.0)], rl.NotForceClosureError, "a friction of 0.99+|a friction of 1"),
+        ([(0, 1.0), (2, 1.0)], rl.NotForceClosureError, "a friction of 1"),
         ([(0, 1.0), (0, 2.0)], rl.NotForceClosureError, "no friction makes it so"),
         ("grasp", rl.ContactError, "pair"),
         (None, rl.ContactError, "iterable"),

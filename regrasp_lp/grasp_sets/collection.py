@@ -221,6 +221,10 @@ class GraspSets(Sequence[GraspSet]):
             self.functions(index),
         )
 
+    def __repr__(self) -> str:
+        counts = ", ".join(f"{len(family)} {family.kind}" for family in self.families)
+        return f"<{len(self)} GraspSets of {self.polygon.name!r}: {counts}>"
+
     def __iter__(self) -> Iterator[GraspSet]:
         return (self[i] for i in range(len(self)))
 

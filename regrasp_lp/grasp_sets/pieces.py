@@ -14,7 +14,7 @@ from regrasp_lp.torque import TorqueFunctions
 
 Measure = Literal["margin", "tolerance"]
 
-BARELY_APART = 1e-4
+BARELY_APART = 1e-3
 """For `piece_sets(apart=…)`: contacts that do not coincide, at next to no cost in margin."""
 
 

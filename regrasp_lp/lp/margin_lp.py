@@ -47,7 +47,7 @@ class MarginSolutions:
     bounds : numpy.ndarray, shape (B,)
         An upper bound of the largest margin, from the multipliers by weak duality.
     units : numpy.ndarray, shape (B,)
-        Magnitude of the rows, what the gap is relative to.
+        What the gap is relative to: magnitude of the rows, over their least scale if below 1.
     """
 
     points: FloatArray
@@ -132,6 +132,9 @@ def _solve_stack(sets: LinearSets, solver: Solver) -> MarginSolutions:
     scaled = replace(
         sets, rows=sets.rows / units[:, None, None], bounds=sets.bounds / units[:, None]
     )
+    # A rounding error in a row of small scale is a large one in the margin.
+    least = np.where(sets.scales > 0, sets.scales, 1.0).min(axis=1, initial=1.0)
+    units = units / least
     solution = enclose(sets, *solver.solve(scaled, thorough=False), units)
     open_ = np.flatnonzero(~solution.solved)
     if not open_.size:

@@ -11,6 +11,9 @@ from regrasp_lp.planning.steps import Place, Release, Slide, Step
 if TYPE_CHECKING:
     from regrasp_lp.planning.plan import Plan
 
+_ROUNDING = 1e-9
+"""Part of an object's size below which a margin means nothing in practice."""
+
 _STEP_WIDTH = 41
 """Of the column of steps, for an account of less than 80 columns."""
 
@@ -30,12 +33,9 @@ def account(plan: Plan) -> str:
     head = [
         f"Regrasp of {name}: {_count(len(plan.steps), 'step')}, "
         f"{_count(plan.placements, 'placement')}, {plan.hand.fingers} fingers",
-        f"margin {plan.margin:.4g}, tolerance {plan.tolerance:.4g}"
-        + (
-            f"; where the planner chose {plan.chosen_margin:.4g} and {plan.chosen_tolerance:.4g}"
-            if plan.chosen_margin < float("inf")
-            else ""
-        ),
+        f"least margin {plan.margin:.4g}, least tolerance {plan.tolerance:.4g}",
+        *_chosen(plan),
+        *_warning(plan),
         "",
     ]
     texts = ["start: " + ", ".join(f"{k} on {_at(c)}" for k, c in plan.start.items())]
@@ -50,6 +50,20 @@ def account(plan: Plan) -> str:
         lines += [_row("", line) for line in rest]
     goal = ", ".join(_at(contact) for contact in plan.goal)
     return "\n".join([*head, *lines, "", f"goal reached: {goal}"])
+
+
+def _chosen(plan: Plan) -> list[str]:
+    """What the planner could choose: start and goal are given, and may be worse."""
+    if plan.chosen_margin == float("inf"):
+        return []
+    margin, tolerance = f"{plan.chosen_margin:.4g}", f"{plan.chosen_tolerance:.4g}"
+    return [f"without start and goal, which are given: {margin} and {tolerance}"]
+
+
+def _warning(plan: Plan) -> list[str]:
+    if plan.margin > _ROUNDING * plan.polygon.diameter:
+        return []
+    return ["warning: within rounding of losing force closure; see where the margin is least"]
 
 
 def _count(number: int, what: str) -> str:

@@ -240,6 +240,13 @@ class Plan:
             write_atomically(path, text)
         return text
 
+    def __eq__(self, other: object) -> bool:
+        """Whether two plans have the same file."""
+        return self.to_document() == other.to_document() if isinstance(other, Plan) else False
+
+    def __hash__(self) -> int:
+        return hash((self.polygon, self.steps))
+
     def __str__(self) -> str:
         from regrasp_lp.planning.account import account
 
@@ -270,12 +277,12 @@ def least_margin_along(functions: TorqueFunctions, f: FloatArray, g: FloatArray)
     """
     if not functions.spans[0]:
         return -np.inf
-    start = functions.values(f)[0][functions.valid[0]]
-    change = functions.values(g)[0][functions.valid[0]] - start
+    start, end = (functions.certain_values(x)[0][functions.valid[0]] for x in (f, g))
+    change = end - start
     apart = change[:, None] - change[None, :]
     crossing = np.divide(
         start[None, :] - start[:, None], apart, out=np.zeros(apart.shape), where=apart != 0
     )
-    t = np.concatenate(([0.0, 1.0], crossing[(crossing > 0) & (crossing < 1)]))
-    values = start[:, None] + change[:, None] * t
+    t = np.concatenate(([0.0], crossing[(crossing > 0) & (crossing < 1)]))
+    values = np.column_stack((start[:, None] + change[:, None] * t, end))
     return float(min(values.max(axis=0).min(), (-values).max(axis=0).min()))

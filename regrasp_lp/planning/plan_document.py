@@ -118,11 +118,12 @@ def read_plan_document(path: str | os.PathLike[str]) -> dict[str, Any]:
     Raises
     ------
     FileFormatError
-        If the file is no JSON, no plan, of another version or incomplete.
-    OSError
-        If the file cannot be read.
+        If the file cannot be read, is no JSON, no plan, of another version or incomplete.
     """
-    data = Path(path).read_bytes()
+    try:
+        data = Path(path).read_bytes()
+    except OSError as error:
+        raise FileFormatError(f"{path}: cannot be read: {error.strerror}") from error
     try:
         document = json.loads(data.decode("utf-8"))
     except (ValueError, RecursionError) as error:

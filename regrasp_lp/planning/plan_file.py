@@ -10,10 +10,9 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
-import numpy as np
-
 from regrasp_lp.contact import Contact, Grasp
-from regrasp_lp.errors import FileFormatError
+from regrasp_lp.errors import FileFormatError, RegraspError
+from regrasp_lp.friction import per_edge_friction
 from regrasp_lp.planning.hand import Hand
 from regrasp_lp.planning.plan import HeldGrasp, Plan, Support
 from regrasp_lp.planning.steps import Place, Release, Slide, Step
@@ -67,18 +66,19 @@ def read_plan(path: str | Path) -> Plan:
     """
     document = read_plan_document(path)
     try:
-        return plan_from_document(document)
-    except (KeyError, TypeError, IndexError) as error:
+        plan = plan_from_document(document)
+        _ = plan.grasps  # steps that no hand can do, or that the list of grasps does not fit
+    except (KeyError, TypeError, IndexError, ValueError, RegraspError) as error:
         raise FileFormatError(f"{path}: not a complete plan: {error!r}") from error
+    return plan
 
 
 def plan_from_document(document: Mapping[str, Any]) -> Plan:
     """Return the plan that a document of the plan's format describes."""
     rings = document["polygon"]
     polygon = Polygon(rings["exterior"], rings.get("holes", ()), document.get("name", ""))
-    friction = np.asarray(document["friction"], dtype=np.float64)
-    friction = np.array(np.broadcast_to(friction, (polygon.n_edges,)))
-    friction.setflags(write=False)
+    mu = document["friction"]
+    friction = per_edge_friction(mu[0] if len(mu) == 1 else mu, polygon.n_edges)
 
     def contact(entry: Mapping[str, Any]) -> Contact:
         return polygon.resolve_contact(Contact.at_fraction(entry["edge"], entry["fraction"]))

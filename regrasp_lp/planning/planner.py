@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable
 from dataclasses import dataclass
+from decimal import ROUND_CEILING, Context
 from itertools import combinations, pairwise
 
 from regrasp_lp.contact import Contact, Grasp
@@ -28,6 +29,9 @@ from regrasp_lp.planning.regrip import regrip_moves
 from regrasp_lp.planning.search import fewest_placements
 from regrasp_lp.polygon import Polygon
 from regrasp_lp.switches import Switches
+
+_UPWARDS = Context(prec=6, rounding=ROUND_CEILING)
+"""Six digits of a friction that do hold."""
 
 GraspLike = Grasp | Iterable[Contact | tuple[int, float]]
 
@@ -222,6 +226,6 @@ def _not_closed(polygon: Polygon, grasp: Grasp, role: str) -> str:
     remedy = (
         "no friction makes it so: move its contacts"
         if least is None
-        else f"it would be at a friction of {least:.6g} on all edges or more"
+        else f"it would be at a friction of {_UPWARDS.create_decimal(least)} on all edges or more"
     )
     return f"the {role} ({contacts}) is not in force closure: {remedy}"
