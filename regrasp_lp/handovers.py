@@ -103,7 +103,7 @@ def decide_held(first: Shadows, second: Shadows, solver: Solver) -> BoolArray:
     """Whether aligned projections have a common point: exactly, or by LP if three are held."""
     if first.held < 3:
         return can_switch(first, second)
-    return best_joins(first, second, solver).exist
+    return best_joins(first, second, solver, enough=0.0).exist
 
 
 def _projections(sets: GraspSets, index: int, held: int) -> Shadows:

@@ -336,16 +336,17 @@ def test_switches_on_demand_are_the_stored_ones(
     for start, goal in combinations(grasps, 2):
         if not (stored.locate(start) and stored.locate(goal)):
             continue
-        try:
-            plan = stored.plan(start, goal)
-        except rl.NoPlanFound as error:
-            with pytest.raises(rl.NoPlanFound) as refusal:
-                demanded.plan(start, goal)
-            assert refusal.value.explanation == error.explanation
-        else:
-            again = demanded.plan(start, goal)
-            assert again.placements == plan.placements
-            assert again.verify().ok
+        assert outcome(demanded, start, goal) == outcome(stored, start, goal)
+
+
+def outcome(graph: rl.SwitchingGraph, start: rl.Grasp, goal: rl.Grasp) -> int | str:
+    """Placements of a plan, or why there is none."""
+    try:
+        plan = graph.plan(start, goal)
+    except rl.NoPlanFound as error:
+        return error.explanation
+    assert plan.verify().ok
+    return plan.placements
 
 
 def test_counting_switches_on_demand_counts_pairs_once(monkeypatch: pytest.MonkeyPatch) -> None:
@@ -359,7 +360,7 @@ def test_counting_switches_on_demand_counts_pairs_once(monkeypatch: pytest.Monke
 
 
 @pytest.mark.parametrize("sets", ["complete", "chapter"])
-@pytest.mark.parametrize(("name", "share"), [("rectangle", 0.6), ("ell", 0.45), ("star 8", 0.2)])
+@pytest.mark.parametrize(("name", "share"), [("rectangle", 0.6), ("ell", 0.45), ("regular 6", 0.5)])
 def test_min_margin_keeps_exactly_the_larger_ones(name: str, share: float, sets: str) -> None:
     graph = graph_of(name, sets=sets)
     least = share * float(graph.sets.margins.max())

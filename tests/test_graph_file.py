@@ -137,10 +137,8 @@ def test_flipped_bits(saved: Path) -> None:
         damaged = bytearray(content)
         damaged[place] ^= 1 << int(rng.integers(8))
         saved.write_bytes(damaged)
-        try:
-            again = rl.load_graph(saved)
-        except rl.FileFormatError as error:
-            assert str(saved) in str(error)
+        again = load_or_none(saved)
+        if again is None:
             refused += 1
         else:
             assert_equal(graph, again)
@@ -154,11 +152,15 @@ def test_every_flipped_bit(saved: Path) -> None:
         damaged = bytearray(content)
         damaged[place // 8] ^= 1 << (place % 8)
         saved.write_bytes(damaged)
-        try:
-            again = rl.load_graph(saved)
-        except rl.FileFormatError:
-            continue
-        assert graph == again
+        again = load_or_none(saved)
+        assert again is None or graph == again
+
+
+def load_or_none(path: Path) -> rl.SwitchingGraph | None:
+    try:
+        return rl.load_graph(path)
+    except rl.FileFormatError:
+        return None
 
 
 def test_other_versions_and_formats(saved: Path) -> None:

@@ -267,7 +267,7 @@ def test_a_solver_that_stops_early_is_said(monkeypatch: pytest.MonkeyPatch) -> N
     ends = [(0, 2.0), (2, 2.0)], [(1, 1.0), (3, 1.0)]
     with monkeypatch.context() as patch:
         patch.setattr(cp.Problem, "status", "user_limit")
-        with pytest.raises(rl.SolverError, match="status 'user_limit'.*try the other solver"):
+        with pytest.raises(rl.SolverError, match=r"status 'user_limit'.*try the other solver"):
             graph.plan(*ends)
 
     def fail(*_: object, **__: object) -> None:

@@ -294,7 +294,7 @@ def test_regripping_a_sliver_is_refused() -> None:
     needle = rl.Polygon([(0, 0), (1, 0), (1, 1e-6), (0, 1e-6)])
     graph = rl.build_switching_graph(needle, 0.5)
     start, goal = [(0, 0.1), (2, 0.9)], [(0, 0.9), (2, 0.1)]
-    with pytest.raises(rl.NoPlanFound, match='more than 1000 placements.*aligning="slide"'):
+    with pytest.raises(rl.NoPlanFound, match=r'more than 1000 placements.*aligning="slide"'):
         graph.plan(start, goal, "regrip")
     assert graph.plan(start, goal).verify().ok
 
@@ -362,7 +362,7 @@ def test_per_edge_friction() -> None:
 
 def test_regripping_needs_a_free_finger() -> None:
     start, goal = [(0, 1.0), (0, 3.0), (2, 2.0)], [(0, 0.5), (0, 2.5), (2, 1.5)]
-    with pytest.raises(rl.NoPlanFound, match='needs a free finger.*all 3.*aligning="slide"') as e:
+    with pytest.raises(rl.NoPlanFound, match=r'needs a free finger.*all 3.*aligning="slide"') as e:
         rl.build_switching_graph(rectangle(), 0.05, rl.Hand(3)).plan(
             [(0, 1.0), (0, 3.0), (2, 2.5)], [(0, 0.5), (0, 2.5), (2, 1.5)], "regrip"
         )
@@ -480,9 +480,9 @@ def test_wrong_aligning() -> None:
         lambda: block_graph().plan(GOOD, GOOD, "jump"),
         lambda: rl.plan_regrasp(rectangle(), GOOD, GOOD, 0.4, aligning="jump"),
     ):
-        with pytest.raises(rl.OptionError, match="slide.*regrip.*'jump'"):
+        with pytest.raises(rl.OptionError, match=r"slide.*regrip.*'jump'"):
             call()
-    with pytest.raises(rl.OptionError, match="complete.*chapter"):
+    with pytest.raises(rl.OptionError, match=r"complete.*chapter"):
         rl.plan_regrasp(rectangle(), GOOD, GOOD, 0.4, sets="some")
 
 

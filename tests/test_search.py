@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 from functools import cache
+from itertools import pairwise
+from itertools import pairwise
 
 import networkx as nx
 import numpy as np
@@ -47,7 +49,7 @@ def search(
 
 
 def cost_of(costs: nx.DiGraph, path: list[int]) -> int:
-    return sum(costs[s][t]["cost"] for s, t in zip(path, path[1:], strict=False))
+    return sum(costs[s][t]["cost"] for s, t in pairwise(path))
 
 
 def least_of(graph: rl.SwitchingGraph, path: list[int]) -> float:
