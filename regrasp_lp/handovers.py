@@ -6,12 +6,11 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from regrasp_lp.errors import SolverError
 from regrasp_lp.friction import BoolArray, FloatArray, IntArray
 from regrasp_lp.grasp_sets.collection import GraspSets
 from regrasp_lp.grasp_sets.pieces import BARELY_APART
 from regrasp_lp.joins import best_joins
-from regrasp_lp.lp import Solver
+from regrasp_lp.lp import GAP, Solver
 from regrasp_lp.shadows import Shadows, shadows
 from regrasp_lp.switching import can_switch
 
@@ -63,11 +62,8 @@ def handovers(
     -------
     list of Handover
         The largest margin first.
-
-    Raises
-    ------
-    SolverError
-        If the switch exists only within rounding.
+        A switch that exists only within rounding may have a margin that is not
+        positive, and grasps that only nearly hold.
     """
     if held == 0:
         margin = float(min(sets.margins[first], sets.margins[second]))
@@ -79,6 +75,10 @@ def handovers(
     one, other = one.take(i), other.take(j)
     joins = best_joins(one, other, solver, apart=BARELY_APART)
     feasible = decide_held(one, other, solver)
+    if feasible.any() and not np.isfinite(joins.margins[feasible]).any():
+        # It exists, but within rounding: the nearest grasps are the best that can be said.
+        least = -GAP * sets.sources[0].cones.size
+        joins = best_joins(one, other, solver, apart=BARELY_APART, least=least)
     found = [
         Handover(
             tuple(zip(one.slots[n].tolist(), other.slots[n].tolist(), strict=True)),
@@ -88,11 +88,6 @@ def handovers(
         )
         for n in np.flatnonzero(feasible & np.isfinite(joins.margins))
     ]
-    if feasible.any() and not found:
-        raise SolverError(
-            f"the switch between the sets on edges {sets[first].edges} and {sets[second].edges} "
-            "exists, but is thinner than rounding: no margin LP can find its grasps"
-        )
     found.sort(key=lambda h: (-h.margin, h.slots))
     # What exists is decided without regard to the order of two contacts on one edge; a choice of
     # slots that exists in the other order only has a negative margin here.

@@ -49,6 +49,7 @@ def best_joins(
     *,
     apart: float = 0.0,
     enough: float = np.inf,
+    least: float = 0.0,
 ) -> Joins:
     """Maximise the margin over all joined pieces of pairs of sets.
 
@@ -61,6 +62,8 @@ def best_joins(
         As for `piece_sets`: keeps contacts of a grasp that could meet apart, and in order.
     enough : float
         No better join is looked for once one exists whose margin is larger than this.
+    least : float
+        Only pieces whose own margin is larger are joined; below 0 for sets within rounding.
 
     Returns
     -------
@@ -77,7 +80,7 @@ def best_joins(
     kinds, group = np.unique(key, axis=0, return_inverse=True)
     for number in range(len(kinds)):
         rows = np.flatnonzero(group.ravel() == number)
-        group_ = _Group.of(first.take(rows), second.take(rows), apart)
+        group_ = _Group.of(first.take(rows), second.take(rows), apart, least)
         _solve_group(group_, rows, joins, solver, enough)
     return joins
 
@@ -89,14 +92,15 @@ class _Group:
     functions: tuple[TorqueFunctions, TorqueFunctions]
     names: tuple[list[str], list[str]]
     apart: float
+    least: float
 
     @classmethod
-    def of(cls, first: Shadows, second: Shadows, apart: float) -> _Group:
+    def of(cls, first: Shadows, second: Shadows, apart: float, least: float) -> _Group:
         one, other = (s.sources[s.source[0]].take(s.row) for s in (first, second))
         names = [f"f{i}" for i in range(one.m)], [f"g{i}" for i in range(other.m)]
         for here, there in zip(first.slots[0], second.slots[0], strict=True):
             names[1][there] = names[0][here]
-        return cls((one, other), names, apart)
+        return cls((one, other), names, apart, least)
 
     def candidates(self) -> tuple[IntArray, FloatArray]:
         """All (pair, j, k, j', k') with existing pieces, and the smaller of their margins.
@@ -104,8 +108,8 @@ class _Group:
         Sorted by pair, the most promising first.
         """
         margins = [piece_margins(functions) for functions in self.functions]
-        pair, j, k = np.nonzero(margins[0] > 0)
-        other, j2, k2 = np.nonzero(margins[1] > 0)
+        pair, j, k = np.nonzero(margins[0] > self.least)
+        other, j2, k2 = np.nonzero(margins[1] > self.least)
         counts = np.bincount(other, minlength=len(self.functions[0]))
         each = counts[pair]
         mine = np.arange(len(pair)).repeat(each)

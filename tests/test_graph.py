@@ -38,7 +38,11 @@ def pairs_of(graph: rl.SwitchingGraph) -> dict[tuple[int, int], int]:
 
 
 CASES = [
-    (name, k, sets) for name in SMALL for k in (3, 4, 5, 6) for sets in ("complete", "chapter")
+    (name, k, sets)
+    for name in SMALL
+    for k in (3, 4, 5, 6)
+    for sets in ("complete", "chapter")
+    if name != "nut" or k < 5
 ]
 
 
@@ -359,8 +363,16 @@ def test_counting_switches_on_demand_counts_pairs_once(monkeypatch: pytest.Monke
 # --- options ------------------------------------------------------------------------------------
 
 
-@pytest.mark.parametrize("sets", ["complete", "chapter"])
-@pytest.mark.parametrize(("name", "share"), [("rectangle", 0.6), ("ell", 0.45), ("regular 6", 0.5)])
+@pytest.mark.parametrize(
+    ("name", "share", "sets"),
+    [
+        ("rectangle", 0.6, "complete"),
+        ("rectangle", 0.6, "chapter"),
+        ("ell", 0.45, "complete"),
+        ("ell", 0.45, "chapter"),
+        ("star 8", 0.2, "chapter"),
+    ],
+)
 def test_min_margin_keeps_exactly_the_larger_ones(name: str, share: float, sets: str) -> None:
     graph = graph_of(name, sets=sets)
     least = share * float(graph.sets.margins.max())

@@ -197,6 +197,8 @@ def test_round_trip(tmp_path: Path) -> None:
         assert path.read_text(encoding="utf-8") == text
         again = rl.read_plan(path)
         assert again.to_json() == text
+        assert again == plan
+        assert hash(again) == hash(plan)
         assert again.polygon == plan.polygon
         assert again.steps == plan.steps
         assert again.supports == plan.supports
@@ -211,6 +213,11 @@ def test_round_trip(tmp_path: Path) -> None:
         assert rl.check_plan(path).ok
         assert rl.check_plan(str(path)).ok
         assert rl.check_plan(again).ok
+
+
+def test_plans_differ_by_content() -> None:
+    assert plans()[0] != plans()[1]
+    assert plans()[0] != plans()[0].to_json()
 
 
 def test_a_changed_plan_is_found_out(tmp_path: Path) -> None:

@@ -14,6 +14,7 @@ from regrasps import PARTS, Replay, directed, nut, optimal_placements, random_gr
 
 import regrasp_lp as rl
 from regrasp_lp.planning.plan import Plan
+from regrasp_lp.planning.verification import Report
 
 FRICTIONS = (0.1, 0.3, 0.5, 1.0, 1.5)
 
@@ -185,7 +186,7 @@ def test_plans_on_the_corpus(corpus: list[rl.Polygon]) -> None:
 @pytest.mark.parametrize("name", PARTS)
 def test_planning_without_the_graph_needs_no_more_placements(name: str, aligning: str) -> None:
     polygon = PARTS[name]()
-    for number, pairs in ((1, 4), (2, 4)):
+    for number, pairs in ((1, 3), (2, 3)):
         for graph, start, goal, outcome in attempts(
             polygon, number, pairs, sets="complete", fingers=4, aligning="slide"
         ):
@@ -486,9 +487,20 @@ def test_wrong_aligning() -> None:
         rl.plan_regrasp(rectangle(), GOOD, GOOD, 0.4, sets="some")
 
 
+def test_a_plan_that_fails_its_check_is_not_returned(monkeypatch: pytest.MonkeyPatch) -> None:
+    report = Report(ok=False, fault="step 1: dropped", grasps_checked=1, slides_checked=0)
+    monkeypatch.setattr(Plan, "verify", lambda self: report)
+    with pytest.raises(rl.SolverError, match=r"does not pass its exact check \(step 1: dropped\)"):
+        block_graph().plan(GOOD, [(1, 1.0), (3, 1.0)])
+
+
 def test_a_hand_of_two_is_none() -> None:
     with pytest.raises(rl.HandError, match="at least 3 fingers"):
         rl.plan_regrasp(rectangle(), GOOD, GOOD, 0.4, rl.Hand(2))
+    for build in (rl.plan_regrasp, rl.build_switching_graph):
+        grasps = (GOOD, GOOD) if build is rl.plan_regrasp else ()
+        with pytest.raises(rl.HandError, match=r"hand must be a Hand, got 4"):
+            build(rectangle(), *grasps, 0.4, 4)
 
 
 def test_plans_are_plans() -> None:

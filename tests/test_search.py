@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from functools import cache
 from itertools import pairwise
-from itertools import pairwise
 
 import networkx as nx
 import numpy as np

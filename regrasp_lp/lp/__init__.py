@@ -6,6 +6,6 @@ and none is believed: an answer is its point and its multipliers, from which a l
 bound of the optimum are computed here (`margin_lp.enclose`).
 """
 
-from regrasp_lp.lp.margin_lp import MarginSolutions, Solver, get_solver, maximise_margins
+from regrasp_lp.lp.margin_lp import GAP, MarginSolutions, Solver, get_solver, maximise_margins
 
-__all__ = ["MarginSolutions", "Solver", "get_solver", "maximise_margins"]
+__all__ = ["GAP", "MarginSolutions", "Solver", "get_solver", "maximise_margins"]

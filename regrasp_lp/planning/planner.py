@@ -7,6 +7,8 @@ from dataclasses import dataclass
 from decimal import ROUND_CEILING, Context
 from itertools import combinations, pairwise
 
+import numpy as np
+
 from regrasp_lp.contact import Contact, Grasp
 from regrasp_lp.errors import (
     ContactError,
@@ -32,6 +34,12 @@ from regrasp_lp.switches import Switches
 
 _UPWARDS = Context(prec=6, rounding=ROUND_CEILING)
 """Six digits of a friction that do hold."""
+
+_THIN = 1e-9
+"""Margin of a set, in the object's size, up to which it may be too thin for a solver."""
+
+Choices = dict[int, tuple[int, ...]]
+"""The sets that contain a grasp, and which of its contacts are theirs."""
 
 GraspLike = Grasp | Iterable[Contact | tuple[int, float]]
 
@@ -65,20 +73,44 @@ class PlanningProblem:
         SolverError
             If the plan found does not pass its own exact check.
         """
-        sources = dict(self._choices(start))
-        targets = dict(self._choices(goal))
-        path = fewest_placements(
+        ends = dict(self._choices(start)), dict(self._choices(goal))
+        path = self._path(start, goal, ends, self.sets.margins)
+        if path is None:
+            return None
+        try:
+            return self._along(path, start, goal, ends, aligning)
+        except SolverError:
+            # Around sets that are within rounding there may be a way with more placements.
+            thin = self.sets.margins <= _THIN * self.sets.polygon.diameter
+            path = self._path(start, goal, ends, np.where(thin, -np.inf, self.sets.margins))
+            if path is None:
+                raise
+        return self._along(path, start, goal, ends, aligning)
+
+    def _path(
+        self, start: Grasp, goal: Grasp, ends: tuple[Choices, Choices], margins: FloatArray
+    ) -> list[int] | None:
+        sources, targets = ends
+        return fewest_placements(
             self.sets.contacts,
-            self.sets.margins,
+            margins,
             self.switches,
             self.hand,
             dict.fromkeys(sources, 0),
             {i: len(goal) - len(chosen) for i, chosen in targets.items()},
             self._given((start, sources), (goal, targets)),
         )
-        if path is None:
-            return None
-        first, last = sources[path[0]], targets[path[-1]]
+
+    def _along(
+        self,
+        path: list[int],
+        start: Grasp,
+        goal: Grasp,
+        ends: tuple[Choices, Choices],
+        aligning: str,
+    ) -> Plan:
+        """The verified plan along a path of sets."""
+        first, last = ends[0][path[0]], ends[1][path[-1]]
         here, there = start.fractions[list(first)], goal.fractions[list(last)]
         switches = [self._handover(i, j) for i, j in pairwise(path)]
         stages = self._stages(path, switches, here, there)
@@ -92,15 +124,8 @@ class PlanningProblem:
                 run.switch(index, held[t - 1], nodes[0])
             self._align(run, stages[t], nodes, aligning)
         run.place_others(goal)
-        plan = Plan(
-            self.sets.polygon,
-            self.friction,
-            self.hand,
-            fingers,
-            goal,
-            tuple(run.steps),
-            tuple(run.supports),
-        )
+        steps, supports = tuple(run.steps), tuple(run.supports)
+        plan = Plan(self.sets.polygon, self.friction, self.hand, fingers, goal, steps, supports)
         report = plan.verify()
         if not report.ok:
             raise SolverError(
@@ -111,12 +136,12 @@ class PlanningProblem:
 
     def _choices(self, grasp: Grasp) -> list[tuple[int, tuple[int, ...]]]:
         """Sets that contain the grasp or two of its contacts; of each the first choice."""
-        choices: dict[int, tuple[int, ...]] = {}
+        choices: Choices = {}
         for index, chosen in self.sets.holding(grasp):
             choices.setdefault(index, chosen)
         return sorted(choices.items())
 
-    def _given(self, *ends: tuple[Grasp, dict[int, tuple[int, ...]]]) -> dict[int, float]:
+    def _given(self, *ends: tuple[Grasp, Choices]) -> dict[int, float]:
         """Margin of the given contacts in each set that holds the start or the goal."""
         margins: dict[int, float] = {}
         for grasp, choices in ends:

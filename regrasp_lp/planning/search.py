@@ -35,6 +35,7 @@ def fewest_placements(
     contacts : numpy.ndarray of int, shape (N,)
         Number of contacts of each set.
     margins : numpy.ndarray, shape (N,)
+        Sets with -inf are left out.
     switches : Switches
     hand : Hand
     sources, targets : mapping of int to int
@@ -102,6 +103,7 @@ def _settle(
         better = (cost < placements[others]) | (
             (cost == placements[others]) & (margin > least[others])
         )
+        better &= margin > -np.inf
         others, cost, margin = others[better], cost[better], margin[better]
         placements[others], least[others], before[others] = cost, margin, node
         for item in zip(cost.tolist(), (-margin).tolist(), others.tolist(), strict=True):
