@@ -177,7 +177,14 @@ def plan_regrasp(
         for role, grasp in (("start", start), ("goal", goal))
     )
     if "three_finger" in kinds_of(sets) and hand == Hand(4):
-        problem = problem_on_demand(polygon, cones, get_solver("clarabel"), first, last)
+        problem = problem_on_demand(
+            polygon,
+            cones,
+            get_solver("clarabel"),
+            first,
+            last,
+            all_pairs=aligning == "regrip",
+        )
         plan = problem.plan(first, last, aligning) if problem is not None else None
         if plan is not None:
             return plan

@@ -29,7 +29,7 @@ ObjectArray = NDArray[np.object_]
 
 UNIT_ROUNDOFF = 2.0**-53
 _NEARLY_PARALLEL = 1e-5
-_MOST_FRICTION = 1e6
+_LEAST_FRICTION, _MOST_FRICTION = 1e-12, 1e6
 
 
 def per_edge_friction(friction: ArrayLike, n_edges: int) -> FloatArray:
@@ -49,7 +49,7 @@ def per_edge_friction(friction: ArrayLike, n_edges: int) -> FloatArray:
     Raises
     ------
     FrictionError
-        If a value is not a finite number in (0, 1e6], or their number is neither 1 nor `n_edges`.
+        If a value is not a number from 1e-12 to 1e6, or their number is neither 1 nor `n_edges`.
 
     Examples
     --------
@@ -66,16 +66,17 @@ def per_edge_friction(friction: ArrayLike, n_edges: int) -> FloatArray:
         raise FrictionError(
             f"friction must be one value or one per edge ({n_edges}), got shape {mu.shape}"
         )
-    good = np.isfinite(mu) & (mu > 0) & (mu <= _MOST_FRICTION)
+    good = np.isfinite(mu) & (mu >= _LEAST_FRICTION) & (mu <= _MOST_FRICTION)
     if not good.all():
         if mu.ndim == 0:
             raise FrictionError(
-                f"friction must be a positive finite number up to {_MOST_FRICTION:g}, got {mu}"
+                f"friction must be a positive finite number from {_LEAST_FRICTION:g} to "
+                f"{_MOST_FRICTION:g}, got {mu}"
             )
         edge = int(np.argmin(good))
         raise FrictionError(
-            f"friction must be positive and finite, up to {_MOST_FRICTION:g}: "
-            f"got {mu[edge]} at edge {edge}"
+            f"friction must be positive and finite, from {_LEAST_FRICTION:g} to "
+            f"{_MOST_FRICTION:g}: got {mu[edge]} at edge {edge}"
         )
     mu = np.broadcast_to(mu, (n_edges,)).copy()
     mu.setflags(write=False)

@@ -62,6 +62,7 @@ def save_graph(graph: SwitchingGraph, path: str | Path) -> None:
         "hand": {"fingers": graph.hand.fingers},
         "options": asdict(graph.options),
         "seconds": graph.seconds,
+        "stored": isinstance(graph.switches, StoredSwitches),
         "candidates": [family.n_candidates for family in graph.sets.families],
     }
     arrays: dict[str, np.ndarray] = {
@@ -127,7 +128,7 @@ def load_graph(path: str | Path) -> SwitchingGraph:
 
 
 def _graph(header: dict[str, Any], arrays: dict[str, np.ndarray]) -> SwitchingGraph:
-    _check_names(set(arrays), kinds_of(header["options"]["sets"]))
+    _check_names(set(arrays), kinds_of(header["options"]["sets"]), header["stored"])
     rings = np.split(arrays["vertices"], np.cumsum(arrays["ring_sizes"])[:-1])
     polygon = Polygon(rings[0], rings[1:], header["name"])
     cones = Cones.of(polygon, arrays["friction"])
@@ -142,7 +143,7 @@ def _graph(header: dict[str, Any], arrays: dict[str, np.ndarray]) -> SwitchingGr
     sets = GraspSets(polygon, families)
     hand = Hand(header["hand"]["fingers"])
     switches: Switches
-    if "switches.starts" in arrays:
+    if header["stored"]:
         switches = _stored(
             len(sets), *(arrays[f"switches.{n}"] for n in ("starts", "others", "held"))
         )
@@ -158,12 +159,12 @@ def _graph(header: dict[str, Any], arrays: dict[str, np.ndarray]) -> SwitchingGr
     return SwitchingGraph(sets, switches, cones.friction, hand, options, header["seconds"])
 
 
-def _check_names(names: set[str], kinds: tuple[str, ...]) -> None:
+def _check_names(names: set[str], kinds: tuple[str, ...], stored: bool) -> None:
     expected = {"header", "ring_sizes", "vertices", "friction"}
     expected |= {f"{k}.{n}" for k in kinds for n in ("edges", "centers", "margins", "witnesses")}
-    switches = {f"switches.{n}" for n in ("starts", "others", "held")}
-    if names not in (expected, expected | switches):
-        raise ValueError(f"unknown or missing arrays: {sorted(names ^ (expected | switches))}")
+    expected |= {f"switches.{n}" for n in ("starts", "others", "held") if stored}
+    if names != expected:
+        raise ValueError(f"unknown or missing arrays: {sorted(names ^ expected)}")
 
 
 def _family(cones: Cones, kind: str, candidates: int, arrays: dict[str, np.ndarray]) -> Family:

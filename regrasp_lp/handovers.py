@@ -6,6 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from regrasp_lp.contact import Grasp
 from regrasp_lp.friction import BoolArray, FloatArray, IntArray
 from regrasp_lp.grasp_sets.collection import GraspSets
 from regrasp_lp.grasp_sets.pieces import BARELY_APART
@@ -40,6 +41,49 @@ class Handover:
     def held(self) -> int:
         """Number of held contacts."""
         return len(self.slots)
+
+
+@dataclass(frozen=True, eq=False)
+class Switch:
+    """All ways in which a hand can switch between two grasp sets.
+
+    Parameters
+    ----------
+    first, second : int
+        Numbers of the sets.
+    edges : tuple of tuple of int
+        Edges of the held contacts, one entry for each feasible choice, in the order of `handovers`.
+    grasps : tuple of (Grasp, Grasp)
+        For each choice the two grasps with the largest margin; equal in the held contacts.
+    handovers : tuple of Handover
+        The choices; most held contacts first, then largest margin.
+    """
+
+    first: int
+    second: int
+    edges: tuple[tuple[int, ...], ...]
+    grasps: tuple[tuple[Grasp, Grasp], ...]
+    handovers: tuple[Handover, ...]
+
+    def __repr__(self) -> str:
+        ways = ", ".join(str(edges) for edges in self.edges)
+        return f"<Switch {self.first} to {self.second}: hold {ways}; margin {self.margin:.4g}>"
+
+    @property
+    def held(self) -> int:
+        """The largest number of contacts that can be held."""
+        return self.handovers[0].held
+
+    @property
+    def margin(self) -> float:
+        """The largest margin over all choices."""
+        return max(handover.margin for handover in self.handovers)
+
+    @property
+    def witnesses(self) -> tuple[Grasp, Grasp]:
+        """The two grasps of the choice with the largest margin."""
+        best = max(range(len(self.handovers)), key=lambda i: self.handovers[i].margin)
+        return self.grasps[best]
 
 
 def handovers(

@@ -10,11 +10,10 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from regrasp_lp.contact import Grasp
 from regrasp_lp.errors import NoPlanFound
 from regrasp_lp.friction import Cones, FloatArray, IntArray
 from regrasp_lp.grasp_sets.collection import GraspSets
-from regrasp_lp.handovers import Handover, handovers
+from regrasp_lp.handovers import Switch, handovers
 from regrasp_lp.lp import Solver, get_solver
 from regrasp_lp.planning.hand import Hand
 from regrasp_lp.planning.on_demand import problem_on_demand
@@ -37,49 +36,6 @@ if TYPE_CHECKING:
     import networkx as nx
 
 Progress = Callable[[str, int, int], None]
-
-
-@dataclass(frozen=True, eq=False)
-class Switch:
-    """All ways in which a hand can switch between two grasp sets.
-
-    Parameters
-    ----------
-    first, second : int
-        Numbers of the sets.
-    edges : tuple of tuple of int
-        Edges of the held contacts, one entry for each feasible choice, in the order of `handovers`.
-    grasps : tuple of (Grasp, Grasp)
-        For each choice the two grasps with the largest margin; equal in the held contacts.
-    handovers : tuple of Handover
-        The choices; most held contacts first, then largest margin.
-    """
-
-    first: int
-    second: int
-    edges: tuple[tuple[int, ...], ...]
-    grasps: tuple[tuple[Grasp, Grasp], ...]
-    handovers: tuple[Handover, ...]
-
-    def __repr__(self) -> str:
-        ways = ", ".join(str(edges) for edges in self.edges)
-        return f"<Switch {self.first} to {self.second}: hold {ways}; margin {self.margin:.4g}>"
-
-    @property
-    def held(self) -> int:
-        """The largest number of contacts that can be held."""
-        return self.handovers[0].held
-
-    @property
-    def margin(self) -> float:
-        """The largest margin over all choices."""
-        return max(handover.margin for handover in self.handovers)
-
-    @property
-    def witnesses(self) -> tuple[Grasp, Grasp]:
-        """The two grasps of the choice with the largest margin."""
-        best = max(range(len(self.handovers)), key=lambda i: self.handovers[i].margin)
-        return self.grasps[best]
 
 
 @dataclass(frozen=True)
@@ -349,6 +305,9 @@ class SwitchingGraph:
             Any force-closure grasps of 2 or 3 contacts. Contact i of the start is finger i + 1.
         aligning : {"slide", "regrip"}
             How fingers move inside a set: sliding along the edges, or by free fingers taking over.
+            The latter places fingers too; of a path with the fewest placements for switching and
+            one over two-finger sets, both without detours, the better plan is taken, which need
+            not be the best of all.
 
         Returns
         -------
@@ -378,7 +337,12 @@ class SwitchingGraph:
         problem = PlanningProblem(self.sets, self.switches, self.hand, self.friction, self._solver)
         if self._too_large_to_search:
             nearer = problem_on_demand(
-                self.polygon, self._cones, self._solver, grasps["start"], grasps["goal"]
+                self.polygon,
+                self._cones,
+                self._solver,
+                grasps["start"],
+                grasps["goal"],
+                all_pairs=aligning == "regrip",
             )
             problem = problem if nearer is None else nearer
         plan = problem.plan(grasps["start"], grasps["goal"], aligning)

@@ -107,6 +107,11 @@ def optimal_placements(
     graph: rl.SwitchingGraph, start: rl.Grasp, goal: rl.Grasp, costs: nx.DiGraph | None = None
 ) -> int | None:
     """The fewest placements from start to goal by sliding, by networkx alone."""
+    contacts = [
+        {(c.edge, c.fraction) for c in graph.polygon.resolve(grasp)} for grasp in (start, goal)
+    ]
+    if contacts[0] == contacts[1] and graph.locate(start):
+        return 0  # there is nothing to do
     costs = (directed(graph) if costs is None else costs).copy()
     costs.add_nodes_from(("start", "goal"))
     for index in graph.locate(start):

@@ -22,14 +22,15 @@ contact  rings  ring_checks  polygon  wkt  files
 friction  wrenches  force_closure
 torque  margins
 linear_sets
-lp.margin_lp  lp.clarabel_solver  lp.highs_solver  lp
+lp.margin_lp  lp.highs_solver  lp.clarabel_solver  lp
 grasp_sets  grasp_sets.candidates  grasp_sets.families  grasp_sets.pieces  grasp_sets.vertices
 grasp_sets.collection
 quality
 planning  planning.hand  planning.steps
 shadows  switching  joins  handovers  switches
 planning.plan_document  planning.verification  planning.plan  planning.plan_file  planning.account
-planning.search  planning.aligning  planning.path_lp  planning.regrip  planning.execution
+planning.search  planning.aligning  planning.path_lp  planning.regrip  planning.hops
+planning.execution
 planning.planner  planning.on_demand
 summary  switching_graph  build  graph_file
 plotting.palette  plotting.placement  plotting.frame  plotting.outline  plotting.grasps

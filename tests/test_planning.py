@@ -268,8 +268,12 @@ def test_regripping_in_the_same_set() -> None:
     start, goal = [(0, 2.0), (2, 2.0)], [(2, 1.5), (0, 2.75)]
     plan = block_graph().plan(start, goal, "regrip")
     kinds = [type(step) for step in plan.steps]
-    assert kinds == [rl.Place, rl.Release] * (len(kinds) // 2)
+    assert kinds == [rl.Place, rl.Place, rl.Release, rl.Release]
     assert_sound(plan, block_graph())
+    plan = block_graph(fingers=3).plan(start, goal, "regrip")
+    kinds = [type(step) for step in plan.steps]
+    assert kinds == [rl.Place, rl.Release] * (len(kinds) // 2)
+    assert_sound(plan, block_graph(fingers=3))
 
 
 def test_regripping_from_the_border_takes_few_moves() -> None:
@@ -295,6 +299,8 @@ def test_regripping_a_sliver_is_refused() -> None:
     needle = rl.Polygon([(0, 0), (1, 0), (1, 1e-6), (0, 1e-6)])
     graph = rl.build_switching_graph(needle, 0.5)
     start, goal = [(0, 0.1), (2, 0.9)], [(0, 0.9), (2, 0.1)]
+    assert graph.plan(start, goal, "regrip").placements == 2  # with both free fingers at once
+    graph = rl.build_switching_graph(needle, 0.5, rl.Hand(3))
     with pytest.raises(rl.NoPlanFound, match=r'more than 1000 placements.*aligning="slide"'):
         graph.plan(start, goal, "regrip")
     assert graph.plan(start, goal).verify().ok

@@ -39,7 +39,7 @@ class GraspSet:
     margin : float
         The largest margin of a grasp in it, in the object's unit.
     witness : Grasp
-        A grasp strictly inside that attains it.
+        A grasp strictly inside that attains it (of a set within rounding: the nearest doubles).
     torque : TorqueFunctions
         Its torque functions, a stack of one.
     """

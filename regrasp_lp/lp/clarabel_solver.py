@@ -9,6 +9,7 @@ import numpy as np
 from scipy import sparse
 
 from regrasp_lp.linear_sets import FloatArray, LinearSets
+from regrasp_lp.lp.highs_solver import HighsSolver
 
 
 @dataclass(frozen=True)
@@ -25,12 +26,10 @@ class ClarabelSolver:
     name: str = "clarabel"
 
     def solve(self, sets: LinearSets, *, thorough: bool) -> tuple[FloatArray, FloatArray]:
-        """Return points and row multipliers; thorough means one call per LP."""
-        if not thorough:
-            return self._solve_stacked(sets)
-        singles = [self._solve_stacked(single) for single in sets]
-        points = np.concatenate([p for p, _ in singles])
-        return points, np.concatenate([y for _, y in singles])
+        """Return points and row multipliers; thorough means by HiGHS, a vertex each."""
+        if thorough:
+            return HighsSolver().solve(sets, thorough=False)
+        return self._solve_stacked(sets)
 
     def _solve_stacked(self, sets: LinearSets) -> tuple[FloatArray, FloatArray]:
         b, r, n = sets.rows.shape

@@ -102,7 +102,8 @@ class PieceChains:
             raise SolverError(
                 f"no overlap of pieces beyond the accuracy of {self.solver.name} joins two grasps "
                 f"on edges {self.functions.edges[0].tolist()}, which are connected: the set is "
-                "thinner than rounding"
+                "thinner than rounding: leave such sets out (min_margin), or change the friction "
+                "a little"
             )
         return pieces, [points[a, b] for a, b in pairwise(pieces)]
 

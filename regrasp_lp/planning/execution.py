@@ -5,10 +5,10 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 from regrasp_lp.contact import Contact, Grasp
-from regrasp_lp.errors import NoPlanFound
 from regrasp_lp.friction import FloatArray
 from regrasp_lp.grasp_sets.collection import GraspSets
 from regrasp_lp.planning.hand import Hand
+from regrasp_lp.planning.hops import Stop
 from regrasp_lp.planning.plan import Support
 from regrasp_lp.planning.steps import Place, Release, Slide, Step
 
@@ -80,27 +80,22 @@ class Execution:
         if moves:
             self._do(Slide(moves))
 
-    def regrip(self, slot: int, fraction: float) -> None:
-        """Move one contact by placing a free finger there and releasing the old one.
+    def hop(self, stop: Stop) -> None:
+        """Go to another grasp: place its contacts that do not touch, then release the others."""
+        placed = {contact: finger for finger, contact in self._touching.items()}
+        new = [contact for contact in stop.contacts if contact not in placed]
+        leaving = sorted(k for k, contact in self._touching.items() if contact not in stop.contacts)
+        for contact in new:
+            placed[contact] = self._free_finger()
+            if contact == new[-1] and not leaving:
+                self._arrive(stop, placed)
+            self._do(Place(placed[contact], contact))
+        self._arrive(stop, placed)
+        for finger in leaving:
+            self._do(Release(finger))
 
-        Raises
-        ------
-        NoPlanFound
-            If the hand has no free finger.
-        """
-        if len(self._touching) == self._hand.fingers:
-            raise NoPlanFound(
-                f"aligning by repositioning needs a free finger, but all {self._hand.fingers} "
-                f"hold the object on edges {list(self._sets[self._index].edges)}: use "
-                'aligning="slide", or a hand with one more finger'
-            )
-        old, new = self._fingers[slot], self._free_finger()
-        contact = self._contact(slot, fraction)
-        if contact == self._touching[old]:
-            return
-        self._do(Place(new, contact))
-        self._fingers[slot] = new
-        self._do(Release(old))
+    def _arrive(self, stop: Stop, placed: dict[Contact, int]) -> None:
+        self._index, self._fingers = stop.index, [placed[contact] for contact in stop.support]
 
     def switch(self, index: int, held: Sequence[tuple[int, int]], fractions: FloatArray) -> None:
         """Switch to another set: place its contacts that are not held, then release the others."""

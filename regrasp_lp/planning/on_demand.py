@@ -18,7 +18,7 @@ import numpy as np
 
 from regrasp_lp.contact import Grasp
 from regrasp_lp.friction import Cones, FloatArray, IntArray, spanning
-from regrasp_lp.grasp_sets.candidates import runs
+from regrasp_lp.grasp_sets.candidates import runs, two_finger_candidates
 from regrasp_lp.grasp_sets.collection import GraspSets
 from regrasp_lp.grasp_sets.vertices import solve_family
 from regrasp_lp.handovers import decide_held
@@ -36,7 +36,13 @@ _CHUNK = 200_000
 
 
 def problem_on_demand(
-    polygon: Polygon, cones: Cones, solver: Solver, start: Grasp, goal: Grasp
+    polygon: Polygon,
+    cones: Cones,
+    solver: Solver,
+    start: Grasp,
+    goal: Grasp,
+    *,
+    all_pairs: bool = False,
 ) -> PlanningProblem | None:
     """Return the planning problem that consists of the sets along one best path.
 
@@ -47,6 +53,8 @@ def problem_on_demand(
     solver : Solver
     start, goal : Grasp
         Resolved grasps of 2 or 3 contacts in force closure.
+    all_pairs : bool
+        Add all two-finger sets: fingers that only reposition may do best to stay in these.
 
     Returns
     -------
@@ -60,6 +68,8 @@ def problem_on_demand(
     for m, kind in ((2, "two_finger"), (3, "three_finger")):
         rows = sorted({edges for edges in path if len(edges) == m})
         edges = np.array(rows, dtype=np.intp).reshape(-1, m)
+        if m == 2 and all_pairs:
+            edges = np.unique(np.concatenate((edges, two_finger_candidates(cones))), axis=0)
         functions = torque_functions(cones, edges)
         families.append(solve_family(kind, functions, np.full(len(edges), -1), solver))
     sets = GraspSets(polygon, tuple(families))

@@ -176,7 +176,7 @@ def solve_path_problem(problem: PathProblem, solver: str) -> list[FloatArray]:
     short = _merge(problem, np.clip(np.asarray(x.value), 0.0, 1.0))
     if problem.tolerance(short) >= tolerance - 1e-3 * abs(tolerance):
         best = short
-    return problem.grasps(best)
+    return problem.grasps(_merge(problem, best))
 
 
 def _solve(problem: object, solver: str) -> None:
@@ -198,15 +198,27 @@ def _solve(problem: object, solver: str) -> None:
 
 
 def _merge(problem: PathProblem, x: FloatArray) -> FloatArray:
-    """Make variables equal that follow each other along a stage and differ by rounding."""
+    """Make fractions equal that follow each other along a stage and differ by rounding.
+
+    From the goal backwards and then from the start forwards, so that whole runs become one.
+    """
     x = x.copy()
-    for ids, given in zip(problem.variables, problem.given, strict=True):
-        for now, after, fixed in zip(
-            ids[:-1].ravel(), ids[1:].ravel(), given[1:].ravel(), strict=True
-        ):
-            value = x[after] if after >= 0 else fixed
-            if now >= 0 and abs(value - x[now]) <= _SAME:
-                x[now] = value
+
+    def follow(leader: int, follower: int, given: float) -> None:
+        value = x[leader] if leader >= 0 else given
+        if follower >= 0 and abs(value - x[follower]) <= _SAME:
+            x[follower] = value
+
+    runs = [
+        (ids[node, slot], ids[node + 1, slot], given[node, slot], given[node + 1, slot])
+        for ids, given in zip(problem.variables, problem.given, strict=True)
+        for node in range(len(ids) - 1)
+        for slot in range(ids.shape[1])
+    ]
+    for now, after, _, fixed in reversed(runs):
+        follow(after, now, fixed)
+    for now, after, fixed, _ in runs:
+        follow(now, after, fixed)
     return x
 
 

@@ -13,6 +13,7 @@ from regrasp_lp.contact import Contact, Grasp
 from regrasp_lp.errors import (
     ContactError,
     HandError,
+    NoPlanFound,
     NotForceClosureError,
     OptionError,
     SolverError,
@@ -25,6 +26,7 @@ from regrasp_lp.lp import Solver
 from regrasp_lp.planning.aligning import PieceChains, middles
 from regrasp_lp.planning.execution import Execution
 from regrasp_lp.planning.hand import Hand
+from regrasp_lp.planning.hops import Stop, fewest_hops
 from regrasp_lp.planning.path_lp import Stage, build_path_problem, solve_path_problem
 from regrasp_lp.planning.plan import Plan
 from regrasp_lp.planning.regrip import regrip_moves
@@ -74,7 +76,37 @@ class PlanningProblem:
             If the plan found does not pass its own exact check.
         """
         ends = dict(self._choices(start)), dict(self._choices(goal))
-        path = self._path(start, goal, ends, self.sets.margins)
+        if set(start) == set(goal):
+            index, chosen = next(iter(ends[0].items()))
+            fingers = {i + 1: contact for i, contact in enumerate(start)}
+            run = Execution(self.sets, self.hand, fingers, [i + 1 for i in chosen], index)
+            return self._verified(run, fingers, goal)
+        attempts: list[FloatArray] = [self.sets.margins]
+        if aligning == "regrip":
+            # In two-finger sets more fingers are free, so that aligning there takes fewer.
+            attempts.append(np.where(self.sets.contacts == 3, -np.inf, self.sets.margins))
+        plans, refusals = [], []
+        for margins in attempts:
+            try:
+                plan = self._attempt(start, goal, ends, margins, aligning)
+            except NoPlanFound as refusal:
+                refusals.append(refusal)
+                continue
+            plans += [] if plan is None else [plan]
+        if refusals and not plans:
+            raise refusals[0]
+        return min(plans, key=lambda plan: plan.placements, default=None)
+
+    def _attempt(
+        self,
+        start: Grasp,
+        goal: Grasp,
+        ends: tuple[Choices, Choices],
+        margins: FloatArray,
+        aligning: str,
+    ) -> Plan | None:
+        """The plan along the best path of the sets whose margin here is above -inf."""
+        path = self._path(start, goal, ends, margins)
         if path is None:
             return None
         try:
@@ -82,7 +114,7 @@ class PlanningProblem:
         except SolverError:
             # Around sets that are within rounding there may be a way with more placements.
             thin = self.sets.margins <= _THIN * self.sets.polygon.diameter
-            path = self._path(start, goal, ends, np.where(thin, -np.inf, self.sets.margins))
+            path = self._path(start, goal, ends, np.where(thin, -np.inf, margins))
             if path is None:
                 raise
         return self._along(path, start, goal, ends, aligning)
@@ -118,14 +150,22 @@ class PlanningProblem:
         grasps = solve_path_problem(build_path_problem(stages, held, here, there), self.solver.name)
         fingers = {i + 1: contact for i, contact in enumerate(start)}
         run = Execution(self.sets, self.hand, fingers, [i + 1 for i in first], path[0])
-        run.release_others()
-        for t, (index, nodes) in enumerate(zip(path, grasps, strict=True)):
-            if t:
-                run.switch(index, held[t - 1], nodes[0])
-            self._align(run, stages[t], nodes, aligning)
-        run.place_others(goal)
+        if aligning == "regrip":
+            for stop in self._stops(path, stages, grasps, start, goal):
+                run.hop(stop)
+        else:
+            run.release_others()
+            for t, (index, nodes) in enumerate(zip(path, grasps, strict=True)):
+                if t:
+                    run.switch(index, held[t - 1], nodes[0])
+                for node in nodes[1:]:
+                    run.slide(node)
+            run.place_others(goal)
+        return self._verified(run, fingers, goal)
+
+    def _verified(self, run: Execution, start: dict[int, Contact], goal: Grasp) -> Plan:
         steps, supports = tuple(run.steps), tuple(run.supports)
-        plan = Plan(self.sets.polygon, self.friction, self.hand, fingers, goal, steps, supports)
+        plan = Plan(self.sets.polygon, self.friction, self.hand, start, goal, steps, supports)
         report = plan.verify()
         if not report.ok:
             raise SolverError(
@@ -171,15 +211,39 @@ class PlanningProblem:
             stages.append(Stage(chains.functions, chains.pieces[pieces]))
         return stages
 
-    def _align(self, run: Execution, stage: Stage, nodes: FloatArray, aligning: str) -> None:
-        if aligning == "slide":
-            for node in nodes[1:]:
-                run.slide(node)
-            return
-        for slot, fraction in regrip_moves(
-            stage.functions, list(nodes), middles(stage.functions, stage.pieces, self.solver)
-        ):
-            run.regrip(slot, fraction)
+    def _stops(
+        self,
+        path: list[int],
+        stages: list[Stage],
+        grasps: list[FloatArray],
+        start: Grasp,
+        goal: Grasp,
+    ) -> list[Stop]:
+        """The grasps to hop over where fingers are only placed and released."""
+        stops, refusal = [], None
+        for index, stage, nodes in zip(path, stages, grasps, strict=True):
+            way = [nodes[0]]
+            try:
+                middle = middles(stage.functions, stage.pieces, self.solver)
+                for slot, fraction in regrip_moves(stage.functions, list(nodes), middle):
+                    way.append(way[-1].copy())
+                    way[-1][slot] = fraction
+            except NoPlanFound as error:  # it may be possible to hop over this set
+                way, refusal = list(nodes), error
+            for fractions in way:
+                contacts = self.sets.grasp(index, fractions).contacts
+                stops.append(Stop(index, contacts, contacts))
+        stops.insert(0, Stop(path[0], start.contacts, stops[0].support))
+        stops.append(Stop(path[-1], goal.contacts, stops[-1].support))
+        chosen = fewest_hops(self.sets.polygon, self.hand, stops)
+        if chosen is None:
+            raise refusal or NoPlanFound(
+                "aligning by repositioning needs a free finger, but all "
+                f"{self.hand.fingers} hold the object on the way through the sets on edges "
+                f"{[self.sets[i].edges for i in path]}: use "
+                'aligning="slide", or a hand with one more finger'
+            )
+        return [stops[i] for i in chosen[1:]]
 
 
 def check_aligning(aligning: str) -> None:
@@ -231,7 +295,9 @@ def checked_grasp(
             )
     if not is_force_closure(polygon, resolved, friction):
         raise NotForceClosureError(_not_closed(polygon, resolved, role))
-    return resolved
+    # Equal fractions are equal contacts, however their positions were rounded.
+    pairs = zip(resolved.edges.tolist(), resolved.fractions.tolist(), strict=True)
+    return polygon.resolve(Grasp.at_fractions(pairs))
 
 
 def _same_point(polygon: Polygon, one: Contact, other: Contact) -> bool:

@@ -14,6 +14,9 @@ _MOST_HALVINGS = 60
 
 _MOST_MOVES = 1000
 
+_SHARE = 0.1
+"""Part of the margin at the ends of a way that the grasps in between keep."""
+
 
 def regrip_moves(
     functions: TorqueFunctions, way: list[FloatArray], centers: FloatArray
@@ -22,7 +25,7 @@ def regrip_moves(
 
     Between any two grasps all orders of the contacts are tried; each move places a free finger
     and then releases the old one, so that only the grasps between the moves matter. Where no
-    order keeps force closure (decided exactly) the way leads through the middle of the piece: on
+    order keeps a tenth of the margin at the ends the way leads through the middle of the piece: on
     the way from there to a grasp at the border of the set the room only shrinks in proportion, so
     that halving it needs few moves. A contact is never put where another one is.
 
@@ -94,16 +97,17 @@ def _in_some_order(
 ) -> list[tuple[int, float]] | None:
     """Moves from f to g, each contact once at most, or None if no order is possible."""
     moving = np.flatnonzero(f != g).tolist()
+    enough = _SHARE * min(functions.margins(f)[0], functions.margins(g)[0])
+    best, moves = -np.inf, None
     for order in permutations(moving):
-        now, possible = f.copy(), True
+        now, least = f.copy(), np.inf
         for slot in order:
             now[slot] = g[slot]
-            if not (_apart(functions, now) and functions.contain(now[None, :])[0]):
-                possible = False
-                break
-        if possible:
-            return [(slot, float(g[slot])) for slot in order]
-    return None
+            margin = functions.margins(now)[0] if _apart(functions, now) else -np.inf
+            least = min(least, float(margin))
+        if least > max(best, 0.0) and least >= enough:
+            best, moves = least, [(slot, float(g[slot])) for slot in order]
+    return [] if not moving else moves
 
 
 def _apart(functions: TorqueFunctions, fractions: FloatArray) -> bool:
