@@ -29,7 +29,7 @@ ObjectArray = NDArray[np.object_]
 
 UNIT_ROUNDOFF = 2.0**-53
 _NEARLY_PARALLEL = 1e-5
-_LEAST_FRICTION, _MOST_FRICTION = 1e-12, 1e6
+_LEAST_FRICTION, _MOST_FRICTION = 1e-100, 1e6
 
 
 def per_edge_friction(friction: ArrayLike, n_edges: int) -> FloatArray:
@@ -49,7 +49,7 @@ def per_edge_friction(friction: ArrayLike, n_edges: int) -> FloatArray:
     Raises
     ------
     FrictionError
-        If a value is not a number from 1e-12 to 1e6, or their number is neither 1 nor `n_edges`.
+        If a value is not a number from 1e-100 to 1e6, or their number is neither 1 nor `n_edges`.
 
     Examples
     --------

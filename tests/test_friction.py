@@ -172,6 +172,7 @@ def test_friction_per_edge() -> None:
         (math.inf, "positive finite number"),
         (math.nan, "positive finite number"),
         (2e6, "to 1e\\+06"),
+        (1e-101, "from 1e-100"),
         ([0.1, 0.0, 0.2], "got 0.0 at edge 1"),
         ([0.1, 0.2, math.nan], "got nan at edge 2"),
         ([0.1, 0.2], r"one per edge \(3\), got shape \(2,\)"),
