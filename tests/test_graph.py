@@ -510,3 +510,22 @@ def test_handovers_hold_what_is_asked() -> None:
         assert all(h.held == held for h in found)
         assert [h.margin for h in found] == sorted((h.margin for h in found), reverse=True)
     assert handovers.handovers(graph.sets, solver, i, j, 0)[0].slots == ()
+
+
+@pytest.mark.parametrize("angle", [0.05, 0.3])
+def test_switches_within_rounding_are_described(angle: float) -> None:
+    """A turned rectangle at μ = 1: whether adjacent sides can be squeezed is a matter of 1e-17."""
+    turn = np.array([[np.cos(angle), np.sin(angle)], [-np.sin(angle), np.cos(angle)]])
+    polygon = rl.Polygon(np.array([(0, 0), (3, 0), (3, 1), (0, 1)]) @ turn)
+    graph = rl.build_switching_graph(polygon, 1.0)
+    thin = [i for i in range(len(graph)) if abs(graph.sets[i].margin) < 1e-12]
+    assert thin
+    described = 0
+    for i in thin:
+        for j in graph.neighbors(i):
+            switch = graph.switch(i, j)
+            assert switch is not None
+            assert switch.handovers
+            assert abs(switch.margin) < 1e-7  # no better than the thin set
+            described += 1
+    assert described > 0
