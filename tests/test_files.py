@@ -2,14 +2,12 @@ from __future__ import annotations
 
 import json
 import os
-import runpy
 import stat
 from pathlib import Path
 from typing import Any
 
 import pytest
 import shapely
-from conftest import REPOSITORY
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
@@ -237,16 +235,6 @@ def test_workpieces_have_their_dimensions(workpieces: dict[str, Polygon]) -> Non
 def test_stars_have_exactly_the_edges_of_their_names(stars: dict[str, Polygon]) -> None:
     assert [polygon.n_edges for polygon in stars.values()] == [15, 25, 40]
     assert list(stars) == ["star_15", "star_25", "star_40"]
-
-
-def test_models_are_what_the_script_writes() -> None:
-    models = REPOSITORY / "models"
-    script = runpy.run_path(str(models / "generate.py"))
-    for name in ("workpieces", "stars"):
-        text = script["collection"](script[name]())
-        assert (models / f"{name}.geojson").read_text(encoding="utf-8") == text
-        for entry in json.loads(text)["features"]:
-            assert set(entry["properties"]) == {"name", "units", "note"}
 
 
 # --- writing ------------------------------------------------------------------------------------
