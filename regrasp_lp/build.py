@@ -8,6 +8,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from regrasp_lp.errors import HandError, OptionError
+from regrasp_lp.focus_rule import FocusRule
 from regrasp_lp.friction import BoolArray, Cones
 from regrasp_lp.grasp_sets.collection import GraspSets
 from regrasp_lp.grasp_sets.vertices import Progress, build_family, kinds_of
@@ -53,8 +54,10 @@ def build_switching_graph(
     sets : {"complete", "chapter"}
         All force-closure grasps of 2 and 3 contacts, or the chapter's two-finger, concurrent and
         parallel sets.
-    switching : {"contact"}
-        Two sets are adjacent iff the same contacts can be held.
+    switching : {"contact", "focus"}
+        Two sets are adjacent iff the same contacts can be held. The chapter's rule, "focus", asks
+        of concurrent and two-finger sets that the interiors of their focus cells meet: its edges
+        are a subset. It is for the chapter's sets and hand (four fingers).
     min_margin : float
         Drop sets and switches whose best margin is not larger, in the object's unit.
     solver : {"clarabel", "highs"}
@@ -72,6 +75,8 @@ def build_switching_graph(
     ------
     FrictionError, OptionError
         If an argument has no meaning.
+    HandError
+        If `hand` is no hand, or the focus rule is asked for with other than four fingers.
     SolverError
         If a solver left an LP open.
 
@@ -85,8 +90,7 @@ def build_switching_graph(
     kinds = kinds_of(sets)
     backend = get_solver(solver)
     hand = _checked_hand(hand)
-    if switching != "contact":
-        raise OptionError(f'switching must be "contact", got {switching!r}')
+    check_switching(switching, sets, hand)
     if not (np.isfinite(min_margin) and min_margin >= 0):
         raise OptionError(f"min_margin must be a finite length >= 0, got {min_margin!r}")
     seconds, started = {}, time.perf_counter()
@@ -101,7 +105,9 @@ def build_switching_graph(
     seconds["sets"] = time.perf_counter() - started
 
     started = time.perf_counter()
-    rule = switch_rule(grasp_sets, hand, backend, presolve=presolve, min_margin=min_margin)
+    rule = switch_rule(
+        grasp_sets, hand, backend, switching, presolve=presolve, min_margin=min_margin
+    )
     switches: Switches
     if rule.n_pairs > STORE_LIMIT:
         switches = SwitchesOnDemand(rule)
@@ -120,12 +126,34 @@ def _checked_hand(hand: Hand | None) -> Hand:
     return hand
 
 
-def switch_rule(
-    sets: GraspSets, hand: Hand, solver: Solver, *, presolve: bool, min_margin: float
-) -> SwitchRule:
-    """Return the contact rule: decided exactly, or by the margin LPs of joined pieces."""
+def check_switching(switching: str, sets: str, hand: Hand) -> None:
+    """Raise OptionError or HandError if the switching rule is not defined for sets or hand."""
+    if switching not in ("contact", "focus"):
+        raise OptionError(f'switching must be "contact" or "focus", got {switching!r}')
+    if switching == "focus" and sets != "chapter":
+        raise OptionError(
+            f'switching="focus" is defined for the chapter\'s sets, not for sets={sets!r}: '
+            'use sets="chapter", or switching="contact"'
+        )
+    if switching == "focus" and hand != Hand(4):
+        raise HandError(
+            f'switching="focus" is defined for four fingers, not for {hand.fingers}: '
+            'use Hand(4), or switching="contact"'
+        )
 
-    def decide(first: Shadows, second: Shadows) -> BoolArray:
+
+def switch_rule(
+    sets: GraspSets,
+    hand: Hand,
+    solver: Solver,
+    switching: str = "contact",
+    *,
+    presolve: bool = True,
+    min_margin: float = 0.0,
+) -> SwitchRule:
+    """Return the contact rule or the focus rule, decided exactly or by margin LPs."""
+
+    def contact(first: Shadows, second: Shadows) -> BoolArray:
         if presolve and min_margin == 0:
             return decide_held(first, second, solver)
         found = decide_held(first, second, solver) if presolve else np.ones(len(first), dtype=bool)
@@ -134,7 +162,23 @@ def switch_rule(
         found[open_] = joins.exist & (joins.margins > min_margin)
         return found
 
-    return SwitchRule(sets.sources, hand, decide)
+    if switching == "contact":
+        return SwitchRule(sets.sources, hand, contact)
+    focus = FocusRule.of(sets)
+
+    def either(first: Shadows, second: Shadows) -> BoolArray:
+        planar = focus.applies(first, second)
+        found = np.zeros(len(first), dtype=bool)
+        rows = np.flatnonzero(planar)
+        found[rows] = focus.decide(
+            first.take(rows), second.take(rows), None if presolve else solver
+        )
+        # a switch by focus is one by contacts, whose margin is the one that counts
+        rows = np.flatnonzero(found | ~planar if min_margin > 0 else ~planar)
+        found[rows] = contact(first.take(rows), second.take(rows))
+        return found
+
+    return SwitchRule(sets.sources, hand, either)
 
 
 def plan_regrasp(

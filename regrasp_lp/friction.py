@@ -26,6 +26,7 @@ FloatArray = NDArray[np.float64]
 IntArray = NDArray[np.integer[Any]]
 BoolArray = NDArray[np.bool_]
 ObjectArray = NDArray[np.object_]
+SignArray = NDArray[np.int8]
 
 UNIT_ROUNDOFF = 2.0**-53
 _NEARLY_PARALLEL = 1e-5
@@ -81,6 +82,130 @@ def per_edge_friction(friction: ArrayLike, n_edges: int) -> FloatArray:
     mu = np.broadcast_to(mu, (n_edges,)).copy()
     mu.setflags(write=False)
     return mu
+
+
+@dataclass(frozen=True, eq=False)
+class Directions:
+    """k directions ``α rot90(T) + β T`` to each edge vector T, and how they turn to each other.
+
+    Direction ``k i + j`` is the j-th one of edge i.
+
+    Parameters
+    ----------
+    vectors : numpy.ndarray, shape (n, 2)
+        Vector T of each edge.
+    exact_vectors : numpy.ndarray of object (int), shape (n, 2)
+        The same as integers: ``vectors = exact_vectors / unit``, before any rounding.
+    unit : int
+    across : numpy.ndarray, shape (n, k)
+        α, which is 0 or 1.
+    along : numpy.ndarray, shape (n, k)
+        β.
+    """
+
+    vectors: FloatArray
+    exact_vectors: ObjectArray
+    unit: int
+    across: FloatArray
+    along: FloatArray
+
+    @cached_property
+    def values(self) -> FloatArray:
+        """The directions, shape (n k, 2)."""
+        x, y = self.vectors.T
+        normal = np.stack((-y, x), axis=1)
+        across, along = self.across[:, :, None], self.along[:, :, None]
+        of_edges = across * normal[:, None, :] + along * self.vectors[:, None, :]
+        return np.asarray(of_edges.reshape(-1, 2))
+
+    @cached_property
+    def lengths(self) -> FloatArray:
+        """Their lengths, shape (n k,)."""
+        return np.hypot(self.values[:, 0], self.values[:, 1])
+
+    @cached_property
+    def units(self) -> FloatArray:
+        """The directions scaled to length 1, shape (n k, 2)."""
+        return self.values / self.lengths[:, None]
+
+    @cached_property
+    def _integers(self) -> tuple[ObjectArray, ObjectArray]:
+        beta = [Fraction(float(b)) for b in self.along.ravel()]
+        p = np.array([b.numerator for b in beta], dtype=object).reshape(*self.along.shape, 1)
+        q = np.array([b.denominator for b in beta], dtype=object).reshape(*self.along.shape, 1)
+        alpha = self.across.astype(int).astype(object)[:, :, None]
+        x, y = self.exact_vectors.T
+        normal = np.stack((-y, x), axis=1)[:, None, :]
+        exact = q * alpha * normal + p * self.exact_vectors[:, None, :]
+        return exact.reshape(-1, 2), (self.unit * q).ravel()
+
+    @property
+    def exact(self) -> ObjectArray:
+        """Each direction times a positive number that makes it integral, shape (n k, 2)."""
+        return self._integers[0]
+
+    @cached_property
+    def _crosses(self) -> tuple[FloatArray, SignArray]:
+        """Cross products of all pairs, and their exact signs.
+
+        With ``c = T1 × T2`` and ``d = T1 · T2`` the cross product of two directions is
+        ``c (α1 α2 + β1 β2) + d (β1 α2 − α1 β2)``. Each of the two terms carries at most eight
+        roundings, each relative to the sum of the magnitudes of its products, so 16 unit
+        roundoffs of these magnitudes bound the error. Where every product has a factor 0, it is 0.
+        Values of nearly parallel directions are taken from integers, so that they too have full
+        relative accuracy; their signs are too, for a value may be smaller than any double.
+        """
+        x, y = self.vectors.T
+        xy, yx = np.outer(x, y), np.outer(y, x)
+        xx, yy = np.outer(x, x), np.outer(y, y)
+        alpha, beta = self.across.ravel(), self.along.ravel()
+        k = self.along.shape[1]
+
+        def of_edges(each: FloatArray) -> FloatArray:
+            return each.repeat(k, axis=0).repeat(k, axis=1)
+
+        aa, bb = np.outer(alpha, alpha), np.outer(beta, beta)
+        difference = np.outer(beta, alpha) - np.outer(alpha, beta)
+        value = of_edges(xy - yx) * (aa + bb) + difference * of_edges(xx + yy)
+        bound = of_edges(np.abs(xy) + np.abs(yx)) * (aa + np.abs(bb))
+        bound += np.abs(difference) * of_edges(np.abs(xx) + np.abs(yy))
+        bound *= 16 * UNIT_ROUNDOFF
+        inaccurate = np.maximum(bound, _NEARLY_PARALLEL * np.outer(self.lengths, self.lengths))
+        sx, sy = np.abs(np.sign(x)), np.abs(np.sign(y))
+        crossing = of_edges(np.outer(sx, sy) + np.outer(sy, sx))
+        aligned = of_edges(np.outer(sx, sx) + np.outer(sy, sy))
+        open_ = (np.abs(value) <= inaccurate) & (
+            (crossing > 0) | ((difference != 0) & (aligned > 0))
+        )
+        first, second = np.nonzero(np.triu(open_, 1))
+        if first.size:
+            e1, e2 = self.exact[first], self.exact[second]
+            exact = e1[:, 0] * e2[:, 1] - e1[:, 1] * e2[:, 0]
+            factor = self._integers[1][first] * self._integers[1][second]
+            accurate = np.array([c / f for c, f in zip(exact, factor, strict=True)], dtype=float)
+            value[first, second] = accurate
+            value[second, first] = -accurate
+        np.fill_diagonal(value, 0.0)
+        sign = np.sign(value).astype(np.int8)
+        if first.size:
+            sign[first, second] = [(c > 0) - (c < 0) for c in exact]
+            sign[second, first] = -sign[first, second]
+        return value, sign
+
+    @property
+    def cross(self) -> FloatArray:
+        """``d_r × d_s`` of all pairs, to full relative accuracy, shape (n k, n k)."""
+        return self._crosses[0]
+
+    @property
+    def cross_sign(self) -> SignArray:
+        """Exact sign of ``d_r × d_s``, shape (n k, n k)."""
+        return self._crosses[1]
+
+    @cached_property
+    def sine(self) -> FloatArray:
+        """Sine of the angle from direction r to direction s, shape (n k, n k)."""
+        return self.cross / np.outer(self.lengths, self.lengths)
 
 
 @dataclass(frozen=True, eq=False)
@@ -153,28 +278,9 @@ class Cones:
         return float(np.hypot(extent[0], extent[1]))
 
     @cached_property
-    def rays(self) -> FloatArray:
-        """Boundary rays ``rot90(T) ± μ T``, shape (2 n, 2)."""
-        x, y = self.vectors.T
-        normal = np.stack((-y, x), axis=1)
-        sliding = self.friction[:, None] * self.vectors
-        return np.stack((normal + sliding, normal - sliding), axis=1).reshape(-1, 2)
-
-    @cached_property
-    def ray_lengths(self) -> FloatArray:
-        """Length of each ray, shape (2 n,)."""
-        return np.hypot(self.rays[:, 0], self.rays[:, 1])
-
-    @cached_property
-    def _exact(self) -> tuple[ObjectArray, ObjectArray, ObjectArray, ObjectArray]:
+    def _exact(self) -> tuple[ObjectArray, ObjectArray, int]:
         both, unit = as_integers(np.stack((self.starts, self.ends)))
-        start, vector = both[0], both[1] - both[0]
-        mu = [Fraction(float(m)) for m in self.friction]
-        p = np.array([m.numerator for m in mu], dtype=object)[:, None]
-        q = np.array([m.denominator for m in mu], dtype=object)[:, None]
-        normal = np.stack((-vector[:, 1], vector[:, 0]), axis=1)
-        rays = np.stack((q * normal + p * vector, q * normal - p * vector), axis=1)
-        return start, vector, rays.reshape(-1, 2), (unit * q[:, 0]).repeat(2)
+        return both[0], both[1] - both[0], unit
 
     @property
     def exact_starts(self) -> ObjectArray:
@@ -186,76 +292,54 @@ class Cones:
         """`vectors` as integers, in the unit of `exact_starts`, shape (n, 2)."""
         return self._exact[1]
 
+    @cached_property
+    def boundary(self) -> Directions:
+        """The boundary rays ``rot90(T) ± μ T`` as directions."""
+        slide = np.stack((self.friction, -self.friction), axis=1)
+        return Directions(self.vectors, *self._exact[1:], np.ones(slide.shape), slide)
+
+    @cached_property
+    def lines(self) -> Directions:
+        """Three directions an edge: its two boundary rays, and the edge itself."""
+        ones, zeros = np.ones(self.n_edges), np.zeros(self.n_edges)
+        across = np.stack((ones, ones, zeros), axis=1)
+        along = np.stack((self.friction, -self.friction, ones), axis=1)
+        return Directions(self.vectors, *self._exact[1:], across, along)
+
+    @property
+    def rays(self) -> FloatArray:
+        """Boundary rays ``rot90(T) ± μ T``, shape (2 n, 2)."""
+        return self.boundary.values
+
+    @property
+    def ray_lengths(self) -> FloatArray:
+        """Length of each ray, shape (2 n,)."""
+        return self.boundary.lengths
+
+    @property
+    def unit_rays(self) -> FloatArray:
+        """The rays scaled to length 1, shape (2 n, 2)."""
+        return self.boundary.units
+
     @property
     def exact_rays(self) -> ObjectArray:
         """Each ray times a positive number that makes it integral, shape (2 n, 2)."""
-        return self._exact[2]
-
-    @cached_property
-    def _crosses(self) -> tuple[FloatArray, NDArray[np.int8]]:
-        """Cross products of all pairs of rays, and their exact signs.
-
-        With ``c = T1 × T2``, ``d = T1 · T2`` and ``s = ±1`` for the two sides,
-        ``e1 × e2 = c (1 + s1 s2 μ1 μ2) + (s1 μ1 − s2 μ2) d``. Each of the two terms carries at most
-        eight roundings, each relative to the sum of the magnitudes of its products, so 16 unit
-        roundoffs of these magnitudes bound the error. Where every product has a factor 0, it is 0.
-        Values of nearly parallel rays are taken from integers, so that they too have full relative
-        accuracy; their signs are too, for a value may be smaller than any double.
-        """
-        x, y = self.vectors.T
-        xy, yx = np.outer(x, y), np.outer(y, x)
-        xx, yy = np.outer(x, x), np.outer(y, y)
-        slide = np.stack((self.friction, -self.friction), axis=1).ravel()  # s μ of each ray
-
-        def of_rays(of_edges: FloatArray) -> FloatArray:
-            return of_edges.repeat(2, axis=0).repeat(2, axis=1)
-
-        product = np.outer(slide, slide)
-        difference = slide[:, None] - slide[None, :]
-        value = of_rays(xy - yx) * (1 + product) + difference * of_rays(xx + yy)
-        bound = of_rays(np.abs(xy) + np.abs(yx)) * (1 + np.abs(product))
-        bound += np.abs(difference) * of_rays(np.abs(xx) + np.abs(yy))
-        bound *= 16 * UNIT_ROUNDOFF
-        lengths = self.ray_lengths
-        inaccurate = np.maximum(bound, _NEARLY_PARALLEL * np.outer(lengths, lengths))
-        sx, sy = np.abs(np.sign(x)), np.abs(np.sign(y))
-        crossing = of_rays(np.outer(sx, sy) + np.outer(sy, sx))
-        along = of_rays(np.outer(sx, sx) + np.outer(sy, sy))
-        open_ = (np.abs(value) <= inaccurate) & ((crossing > 0) | ((difference != 0) & (along > 0)))
-        first, second = np.nonzero(np.triu(open_, 1))
-        if first.size:
-            e1, e2 = self.exact_rays[first], self.exact_rays[second]
-            exact = e1[:, 0] * e2[:, 1] - e1[:, 1] * e2[:, 0]
-            factor = self._exact[3][first] * self._exact[3][second]
-            accurate = np.array([c / f for c, f in zip(exact, factor, strict=True)], dtype=float)
-            value[first, second] = accurate
-            value[second, first] = -accurate
-        np.fill_diagonal(value, 0.0)
-        sign = np.sign(value).astype(np.int8)
-        if first.size:
-            sign[first, second] = [(c > 0) - (c < 0) for c in exact]
-            sign[second, first] = -sign[first, second]
-        return value, sign
+        return self.boundary.exact
 
     @property
     def cross(self) -> FloatArray:
         """``e_r × e_s`` of all pairs of rays, to full relative accuracy, shape (2 n, 2 n)."""
-        return self._crosses[0]
+        return self.boundary.cross
 
     @property
-    def cross_sign(self) -> NDArray[np.int8]:
+    def cross_sign(self) -> SignArray:
         """Exact sign of ``e_r × e_s``, shape (2 n, 2 n)."""
-        return self._crosses[1]
+        return self.boundary.cross_sign
 
-    @cached_property
-    def unit_rays(self) -> FloatArray:
-        """The rays scaled to length 1, shape (2 n, 2)."""
-        return self.rays / self.ray_lengths[:, None]
-
-    @cached_property
+    @property
     def sine(self) -> FloatArray:
         """Sine of the angle from ray r to ray s, shape (2 n, 2 n)."""
-        return self.cross / np.outer(self.ray_lengths, self.ray_lengths)
+        return self.boundary.sine
 
     @cached_property
     def opposite(self) -> BoolArray:

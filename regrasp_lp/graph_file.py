@@ -17,7 +17,7 @@ from typing import Any
 
 import numpy as np
 
-from regrasp_lp.build import switch_rule
+from regrasp_lp.build import check_switching, switch_rule
 from regrasp_lp.errors import FileFormatError, RegraspError
 from regrasp_lp.files import write_atomically
 from regrasp_lp.friction import Cones
@@ -142,6 +142,7 @@ def _graph(header: dict[str, Any], arrays: dict[str, np.ndarray]) -> SwitchingGr
     )
     sets = GraspSets(polygon, families)
     hand = Hand(header["hand"]["fingers"])
+    check_switching(options.switching, options.sets, hand)
     switches: Switches
     if header["stored"]:
         switches = _stored(
@@ -152,6 +153,7 @@ def _graph(header: dict[str, Any], arrays: dict[str, np.ndarray]) -> SwitchingGr
             sets,
             hand,
             get_solver(options.solver),
+            options.switching,
             presolve=options.presolve,
             min_margin=options.min_margin,
         )

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import dataclass
 from functools import cached_property
+from itertools import chain
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -25,7 +26,7 @@ from regrasp_lp.planning.planner import (
     checked_grasp,
 )
 from regrasp_lp.polygon import Polygon
-from regrasp_lp.summary import Summary
+from regrasp_lp.summary import KindCounts, Summary
 from regrasp_lp.switches import (
     StoredSwitches,
     Switches,
@@ -206,53 +207,68 @@ class SwitchingGraph:
         return found
 
     @cached_property
-    def _structure(self) -> tuple[IntArray, int]:
-        """Component of each set, numbered by their smallest set, and the number of switches."""
+    def _structure(self) -> tuple[IntArray, IntArray, int]:
+        """Component of each set, in the graph and among the sets of its kind; n_switches."""
         from scipy import sparse
         from scipy.sparse import csgraph
 
         n, contacts = len(self), self.sets.contacts
+        kinds = np.arange(len(self.sets.families)).repeat(np.diff(self.sets.offsets))
         need = np.array([[self.hand.held(a, b) for b in range(4)] for a in range(4)])
-        labels: IntArray = np.arange(n)
 
-        def unite(one: IntArray, other: IntArray, labels: IntArray) -> IntArray:
-            graph = sparse.coo_matrix(
-                (np.ones(len(one)), (labels[one], labels[other])), shape=(n, n)
-            )
+        def united(labels: IntArray, i: IntArray, j: IntArray) -> IntArray:
+            one, other = labels[i], labels[j]
+            apart = one != other
+            pairs = (np.ones(apart.sum()), (one[apart], other[apart]))
+            graph = sparse.coo_matrix(pairs, shape=(n, n))
             return np.asarray(csgraph.connected_components(graph, directed=False)[1][labels])
 
-        count = 0
+        count, joins = 0, []
         for a, b in ((2, 2), (2, 3), (3, 3)):
             one, other = np.flatnonzero(contacts == a), np.flatnonzero(contacts == b)
-            if need[a, b] == 0 and one.size and other.size:
-                count += len(one) * (len(one) - 1) // 2 if a == b else len(one) * len(other)
-                group = np.union1d(one, other)
-                labels = unite(group[:-1], group[1:], labels)
-        seen = []
-        for i, j, _ in self.switches.pairs():
-            listed = need[contacts[i], contacts[j]] > 0
-            seen.append(np.unique(i[listed].astype(np.int64) * n + j[listed]))
-            labels = unite(i, j, labels)
-        if seen:
-            count += len(np.unique(np.concatenate(seen)))
-        _, first, inverse = np.unique(labels, return_index=True, return_inverse=True)
-        return np.asarray(np.argsort(np.argsort(first))[inverse]), count
+            if need[a, b] or not one.size or not other.size:
+                continue
+            if a == b:
+                count += len(one) * (len(one) - 1) // 2
+                joins.append((one[:-1], one[1:]))
+            else:  # two-finger sets are all adjacent to each other, too
+                count += len(one) * len(other)
+                joins.append((one[:1].repeat(len(other)), other))
+        labels: IntArray = np.arange(n)
+        within: IntArray = np.arange(n)
+        listed = [np.zeros(0, dtype=np.int64)]
+        for i, j in chain(joins, ((i, j) for i, j, _ in self.switches.pairs())):
+            labels = united(labels, i, j)
+            same = kinds[i] == kinds[j]
+            within = united(within, i[same], j[same])
+            holds = need[contacts[i], contacts[j]] > 0
+            listed.append(i[holds].astype(np.int64) * n + j[holds])
+        keys = np.concatenate(listed)
+        keys.sort()  # a pair may come again
+        count += len(keys) - int(np.count_nonzero(keys[1:] == keys[:-1]))
+        return labels, within, count
 
     @property
     def n_switches(self) -> int:
         """Number of adjacent pairs, those that need to hold nothing included."""
-        return self._structure[1]
+        return self._structure[2]
 
     def components(self) -> list[set[int]]:
         """Return the connected components, as sets of set numbers, largest first."""
-        labels, _ = self._structure
-        count = int(labels.max(initial=-1)) + 1
-        found = [set(np.flatnonzero(labels == c).tolist()) for c in range(count)]
-        return sorted(found, key=lambda c: (-len(c), min(c)))
+        labels, _, _ = self._structure
+        order = np.argsort(labels, kind="stable")
+        groups = np.split(order, np.flatnonzero(np.diff(labels[order])) + 1)
+        return sorted((set(g.tolist()) for g in groups if g.size), key=lambda c: (-len(c), min(c)))
 
     def summary(self) -> Summary:
         """Return counts per kind, components and times; printable."""
-        kinds = {family.kind: (family.n_candidates, len(family)) for family in self.sets.families}
+        _, within, _ = self._structure
+        kinds = {
+            family.kind: KindCounts(
+                family.n_candidates, len(family), len(np.unique(within[low : low + len(family)]))
+            )
+            for family, low in zip(self.sets.families, self.sets.offsets, strict=False)
+        }
         return Summary(
             self.polygon.name,
             self.polygon.n_edges,

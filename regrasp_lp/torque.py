@@ -20,12 +20,11 @@ from __future__ import annotations
 from dataclasses import dataclass
 from fractions import Fraction
 from functools import cached_property
-from itertools import combinations
-from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
+from regrasp_lp.circuits import circuit_weights, circuits, cross, exact_weights
 from regrasp_lp.friction import (
     UNIT_ROUNDOFF,
     BoolArray,
@@ -103,8 +102,8 @@ class TorqueFunctions:
             edge = self.edges[rows, slot]
             weight = np.where(ray >= 0, self.weight[:, :, t], 0.0) / self.scale
             force = cones.unit_rays[ray] * weight[..., None]
-            offset += _cross(cones.local_starts[edge], force)
-            turn = _cross(cones.vectors[edge], force)
+            offset += cross(cones.local_starts[edge], force)
+            turn = cross(cones.vectors[edge], force)
             for i in range(self.m):
                 slopes[:, :, i] += np.where(slot == i, turn, 0.0)
             magnitude += np.where(ray >= 0, reach[edge], 0.0)
@@ -316,8 +315,8 @@ class TorqueFunctions:
             slot = self.slot[rows, columns, t]
             edge = self.edges[rows, slot]
             force = weights[:, t, None] * self.cones.exact_rays[ray[:, t]]
-            constant = constant + _cross(self.cones.exact_starts[edge], force)
-            slopes[np.arange(len(rows)), slot] += _cross(self.cones.exact_vectors[edge], force)
+            constant = constant + cross(self.cones.exact_starts[edge], force)
+            slopes[np.arange(len(rows)), slot] += cross(self.cones.exact_vectors[edge], force)
         return constant, slopes
 
 
@@ -340,21 +339,11 @@ def torque_functions(cones: Cones, edges: IntArray) -> TorqueFunctions:
     """
     edges = np.asarray(edges, dtype=np.intp)
     rays = rays_of(edges)
-    n, k = rays.shape
-    triples = np.array(list(combinations(range(k), 3)), dtype=np.intp).reshape(-1, 3)
-    pairs = np.array(list(combinations(range(k), 2)), dtype=np.intp)
-    a, b, c = (rays[:, triples[:, t]] for t in range(3))
-    turn = cones.cross_sign[a, b]
-    three = (turn != 0) & (cones.cross_sign[b, c] == turn) & (cones.cross_sign[c, a] == turn)
-    two = cones.opposite[rays[:, pairs[:, 0]], rays[:, pairs[:, 1]]]
-    circuit = np.concatenate((three, two), axis=1)
-    members = np.concatenate((triples, np.pad(pairs, ((0, 0), (0, 1)), constant_values=-1)))
-    width = int(circuit.sum(axis=1).max(initial=1))
-    chosen = np.argsort(~circuit, axis=1, kind="stable")[:, :width]
-    valid = np.take_along_axis(circuit, chosen, axis=1)
-    member = np.where(valid[..., None], members[chosen], -1)
-    ray = np.where(member >= 0, rays[np.arange(n)[:, None, None], member], -1)
-    weight = _circuit_weights(cones, ray)
+    one, other = rays[:, :, None], rays[:, None, :]
+    member = circuits(cones.cross_sign[one, other], cones.opposite[one, other])
+    valid = member[:, :, 0] >= 0
+    ray = np.where(member >= 0, rays[np.arange(len(rays))[:, None, None], member], -1)
+    weight = circuit_weights(cones, ray)
     scale = np.where(valid, weight.sum(axis=2), 1.0)
     return TorqueFunctions(
         cones,
@@ -365,46 +354,3 @@ def torque_functions(cones: Cones, edges: IntArray) -> TorqueFunctions:
         weight,
         scale,
     )
-
-
-def _circuit_weights(cones: Cones, ray: IntArray) -> FloatArray:
-    """Weights on rays of length 1: the sine of the other two, or 1 and 1."""
-    a, b, c = ray[..., 0], ray[..., 1], ray[..., 2]
-    three = np.stack((cones.sine[b, c], cones.sine[c, a], cones.sine[a, b]), axis=-1)
-    two = np.broadcast_to([1.0, 1.0, 0.0], three.shape)
-    weight = np.where((c >= 0)[..., None], np.abs(three), two)
-    return np.where((a >= 0)[..., None], weight, 0.0)
-
-
-def exact_weights(cones: Cones, ray: IntArray, weight: FloatArray) -> ObjectArray:
-    """Return integers proportional to the weights of functions on `cones.exact_rays`.
-
-    Parameters
-    ----------
-    cones : Cones
-    ray : numpy.ndarray of int, shape (K, 3)
-    weight : numpy.ndarray, shape (K, 3)
-        Only the signs are read, and only where both forces act along one ray.
-
-    Returns
-    -------
-    numpy.ndarray of object (int), shape (K, 3)
-    """
-    e1, e2, e3 = (cones.exact_rays[ray[:, t]] for t in range(3))
-    cross = np.stack((_cross(e2, e3), _cross(e3, e1), _cross(e1, e2)), axis=1)
-    result = np.where(cross[:, 2:] < 0, -cross, cross)
-    two = ray[:, 2] < 0
-    along = two & (ray[:, 0] == ray[:, 1])
-    opposite = np.stack((-_dot(e1, e2), _dot(e1, e1), 0 * e1[:, 0]), axis=1)
-    signs = np.sign(weight).astype(int).astype(object)
-    return np.where(along[:, None], signs, np.where(two[:, None], opposite, result))
-
-
-def _cross(p: NDArray[Any], q: NDArray[Any]) -> NDArray[Any]:
-    result: NDArray[Any] = p[..., 0] * q[..., 1] - p[..., 1] * q[..., 0]
-    return result
-
-
-def _dot(p: NDArray[Any], q: NDArray[Any]) -> NDArray[Any]:
-    result: NDArray[Any] = p[..., 0] * q[..., 0] + p[..., 1] * q[..., 1]
-    return result

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import csv
 import io
 import itertools
 import json
@@ -26,7 +27,7 @@ from regrasp_lp.cli.far_apart import chosen_grasp, far_apart
 from regrasp_lp.cli.progress import ProgressBar
 from regrasp_lp.planning.search import fewest_placements, placements_from
 
-COMMANDS = ("plan", "graph", "show", "check")
+COMMANDS = ("plan", "graph", "table", "show", "check")
 RECTANGLE = ["plan", "parts.geojson", "--name", "rectangle", "--friction", "0.4"]
 TWO_GRASPS = ["--start", "0:30,2:30", "--goal", "1:15,3:15"]
 
@@ -361,6 +362,7 @@ def test_no_grasp_at_all(run: Run, tmp_path: Path) -> None:
 
 CONTACTS_FORM = "write contacts as edge:position separated by commas, as in 4:0.3,0:1.2"
 PARTS = ["plan", "parts.geojson", "--friction", "0.3"]
+FOCUS = ["table", "parts.geojson", "--switching", "focus"]
 
 
 @pytest.mark.parametrize(
@@ -371,6 +373,7 @@ PARTS = ["plan", "parts.geojson", "--friction", "0.3"]
         (["plan"], "required: FILE, --friction"),
         (["plan", "parts.geojson"], "required: --friction"),
         (["graph", "parts.geojson"], "required: --friction"),
+        (["table"], "required: PATH"),
         (["show"], "required: FILE"),
         (["check"], "required: PLAN.json"),
         ([*RECTANGLE, "--frobnicate"], "unrecognized arguments: --frobnicate"),
@@ -405,6 +408,7 @@ PARTS = ["plan", "parts.geojson", "--friction", "0.3"]
         ([*RECTANGLE, "--friction", "0.1,0.2"], "--friction has 2 values, but 'rectangle' has 4"),
         (["graph", "parts.geojson", "--friction", "0.1,0.2"], "but 'rectangle' has 4 edges"),
         (["graph", "parts.geojson", "--friction", "1", "--min-margin", "x"], "'x' is no length"),
+        (["graph", "parts.geojson", "--friction", "1", "--switching", "x"], "'contact', 'focus'"),
         ([*RECTANGLE, "--fingers", "2"], "it takes at least 3"),
         ([*RECTANGLE, "--fingers", "four"], "'four' is no number of fingers"),
         ([*RECTANGLE, "--sets", "all"], "choose from 'complete', 'chapter'"),
@@ -426,6 +430,20 @@ PARTS = ["plan", "parts.geojson", "--friction", "0.3"]
         ([*RECTANGLE, "--json", "parts.geojson"], "parts.geojson is the file that is read"),
         ([*RECTANGLE, "--json", "a.png", "--plot", "a.png"], "a.png cannot be written twice"),
         (["graph", "parts.geojson", "--friction", "1", "--save", "g"], "--save takes one graph"),
+        (["table", "none.wkt"], "regrasp-lp table: error: none.wkt: cannot be read: No such"),
+        (["table", "notes.txt"], "notes.txt: is neither GeoJSON"),
+        (["table", "bow.wkt"], "bow.wkt:"),
+        (["table", "empty"], "empty: holds no file *.geojson or *.wkt"),
+        (["table", "parts.geojson", "--friction", "0.1,0.2"], "'0.1,0.2' has several values"),
+        (["table", "parts.geojson", "--friction", "-1"], "'-1' is no friction coefficient"),
+        (["table", "parts.geojson", "--friction", "1e300"], "friction must be"),
+        (["table", "parts.geojson", "--max-edges", "2"], "'2' is no number of edges"),
+        (["table", "stars.geojson", "--max-edges", "14"], "no polygon has 14 edges or fewer"),
+        (["table", "parts.geojson", "--switching", "x"], "choose from 'contact', 'focus'"),
+        ([*FOCUS, "--sets", "complete"], "the chapter's sets"),
+        (["table", "parts.geojson", "--format", "html"], "'text', 'csv', 'markdown'"),
+        (["table", ".", "-o", "parts.geojson"], "parts.geojson is the file that is read"),
+        (["table", "parts.geojson", "-o", "no/t.csv"], "there is no folder 'no'"),
         (["check", "none.json"], "regrasp-lp check: error: none.json: cannot be read: No such"),
         (["check", "notes.txt"], "notes.txt is no JSON text"),
         (["check", "parts.geojson"], "expected format 'regrasp-plan'"),
@@ -434,6 +452,7 @@ PARTS = ["plan", "parts.geojson", "--friction", "0.3"]
 def test_errors(run: Run, tmp_path: Path, arguments: list[str], fragment: str) -> None:
     (tmp_path / "notes.txt").write_text("buy milk\n")
     (tmp_path / "bow.wkt").write_text("POLYGON ((0 0, 1 1, 1 0, 0 1, 0 0))")
+    (tmp_path / "empty").mkdir()
     before = sorted(tmp_path.iterdir())
     code, out, err = run(*arguments)
     assert (code, out) == (2, "")
@@ -537,7 +556,7 @@ def test_graph_prints_summaries(run: Run) -> None:
     code, out, err = run("graph", "parts.geojson", "--name", "u_channel", "--friction", "0.2")
     assert (code, err) == (0, "")
     assert out.startswith("u_channel: 8 edges\n")
-    assert re.search(r"^three_finger +\d+ +\d+$", out, re.MULTILINE)
+    assert re.search(r"^three_finger +\d+ +\d+ +1$", out, re.MULTILINE)
     assert "switches" in out
 
 
@@ -574,6 +593,162 @@ def test_graph_options_and_file(run: Run) -> None:
     assert graph.hand.fingers == 3
     assert graph.sets.margins.min() > 1
     assert (graph.friction == 0.2).all()
+
+
+def test_graph_by_the_rule_of_the_chapter(run: Run) -> None:
+    common = ["graph", "stars.geojson", "--name", "star_15", "--friction", "0.2"]
+    counts = []
+    for switching in ("contact", "focus"):
+        code, out, err = run(*common, "--sets", "chapter", "--switching", switching)
+        assert (code, err) == (0, "")
+        counts += [int(re.findall(r"^switches +(\d+)$", out, re.MULTILINE)[0])]
+    assert counts[0] > counts[1]
+    assert run(*common, "--switching", "contact")[0] == 0
+    code, _, err = run(*common, "--switching", "focus")
+    assert code == 2
+    assert_one_line(err)
+
+
+# --- table --------------------------------------------------------------------------------------
+
+SQUARES = [f"POLYGON ((0 0, {n} 0, {n} {n}, 0 {n}, 0 0))" for n in (1, 2)]
+
+
+def rows_of(text: str) -> list[dict[str, str]]:
+    return list(csv.DictReader(text.splitlines()))
+
+
+def test_table_of_a_folder(run: Run, tmp_path: Path) -> None:
+    folder = tmp_path / "folder"
+    folder.mkdir()
+    (folder / "b.wkt").write_text("\n".join(SQUARES))
+    (folder / "a.geojson").symlink_to(tmp_path / "parts.geojson")
+    (folder / "notes.txt").write_text("buy milk")
+    code, out, err = run("table", "folder", "--format", "csv", "--max-edges", "20")
+    assert code == 0
+    assert err == "regrasp-lp table: 1 polygon with more than 20 edges left out\n"
+    names = [polygon.name for polygon in rl.read_polygons("parts.geojson") if polygon.n_edges <= 20]
+    assert [row["name"] for row in rows_of(out)] == [*names, "b_0", "b_1"]
+    again = run("table", "folder/a.geojson", "folder/b.wkt", "--max-edges=20", "--format=csv")
+    without_seconds = [
+        re.sub(r",[\d.]+$", "", text, flags=re.MULTILINE) for text in (out, again[1])
+    ]
+    assert without_seconds[0] == without_seconds[1]
+
+
+@pytest.mark.parametrize(
+    ("options", "sets", "switching", "friction"),
+    [
+        ([], "chapter", "focus", np.tan(np.pi / 18)),
+        (["--switching", "contact", "--friction", "0.3"], "chapter", "contact", 0.3),
+        (["--sets", "complete"], "complete", "contact", np.tan(np.pi / 18)),
+    ],
+)
+def test_table_counts_the_graphs_that_are_asked_for(
+    run: Run, options: list[str], sets: str, switching: str, friction: float
+) -> None:
+    code, out, err = run("table", "parts.geojson", "stars.geojson", "--format", "csv", *options)
+    assert (code, err) == (0, "")
+    rows = {row["name"]: row for row in rows_of(out)}
+    assert len(rows) == 11
+    for polygon in rl.read_polygons("stars.geojson")[:2]:
+        graph = rl.build_switching_graph(polygon, friction, sets=sets, switching=switching)
+        row, summary = rows[polygon.name], graph.summary()
+        assert int(row["sets"]) == len(graph)
+        assert int(row["switches"]) == graph.n_switches
+        assert int(row["components"]) == len(graph.components())
+        for kind, counts in summary.kinds.items():
+            assert int(row[f"{kind}_components"]) == counts.components
+
+
+def test_table_fits_and_is_text_by_default(run: Run) -> None:
+    code, out, err = run("table", "parts.geojson", "stars.geojson")
+    assert (code, err) == (0, "")
+    lines = out.splitlines()
+    assert len(lines) == 2 + 11
+    assert "--- concurrent ---" in lines[0]
+    assert max(map(len, lines)) <= 120
+    assert len(set(map(len, lines[1:]))) == 1
+
+
+@pytest.mark.parametrize(
+    ("file", "options", "start"),
+    [
+        ("t.csv", [], "name,edges,"),
+        ("t.md", [], "| name | edges |"),
+        ("t.txt", [], "     "),
+        ("t", ["--format", "csv"], "name,edges,"),
+        ("t.CSV", ["--format", "markdown"], "| name | edges |"),
+        ("t.CSV", [], "name,edges,"),
+    ],
+)
+def test_table_writes_a_file(run: Run, file: str, options: list[str], start: str) -> None:
+    code, out, err = run("table", "parts.geojson", "--max-edges", "8", "-o", file, *options)
+    assert (code, out) == (0, f"wrote {file}\n")
+    assert "left out" in err
+    text = Path(file).read_bytes().decode()
+    assert text.startswith(start)
+    assert text.endswith("\n")
+    assert "\r" not in text
+
+
+def test_table_goes_on_after_a_polygon_that_fails(
+    run: Run, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    failures = {
+        "l_bracket": rl.SolverError("the solver\nstopped early"),
+        "push_t": MemoryError(),
+        "wedge": rl.PolygonError("is no good"),
+    }
+    original = rl.build_switching_graph
+
+    def build(polygon: rl.Polygon, *rest: object, **options: object) -> rl.SwitchingGraph:
+        if polygon.name in failures:
+            raise failures[polygon.name]
+        return original(polygon, *rest, **options)
+
+    monkeypatch.setattr(rl, "build_switching_graph", build)
+    code, out, err = run("table", "parts.geojson", "--max-edges", "10", "-o", "t.csv")
+    assert (code, out) == (2, "wrote t.csv\n")
+    assert err.splitlines() == [
+        "regrasp-lp table: 2 polygons with more than 10 edges left out",
+        "regrasp-lp table: error: l_bracket: the solver stopped early",
+        "regrasp-lp table: error: push_t: not enough memory",
+        "regrasp-lp table: error: wedge: is no good",
+    ]
+    names = [row["name"] for row in rows_of(Path("t.csv").read_text())]
+    assert names == ["rectangle", "t_block", "u_channel"]
+
+
+def test_table_goes_on_after_a_file_that_cannot_be_read(run: Run, tmp_path: Path) -> None:
+    (tmp_path / "bow.wkt").write_text("POLYGON ((0 0, 1 1, 1 0, 0 1, 0 0))")
+    (tmp_path / "good.wkt").write_text(SQUARES[0])
+    code, out, err = run("table", "none.wkt", "bow.wkt", "good.wkt", "--format", "csv")
+    assert code == 2
+    assert [line.split(":")[2] for line in err.splitlines()] == [" none.wkt", " bow.wkt"]
+    assert [row["name"] for row in rows_of(out)] == ["good_0"]
+
+
+def test_table_of_nothing_is_not_written(run: Run, monkeypatch: pytest.MonkeyPatch) -> None:
+    def fail(*_: object, **__: object) -> None:
+        raise rl.SolverError("stopped early")
+
+    monkeypatch.setattr(rl, "build_switching_graph", fail)
+    Path("t.csv").write_text("old")
+    code, out, err = run("table", "stars.geojson", "-o", "t.csv")
+    assert (code, out) == (2, "")
+    assert len(err.splitlines()) == 3
+    assert Path("t.csv").read_text() == "old"
+
+
+def test_a_folder_that_cannot_be_listed(run: Run, monkeypatch: pytest.MonkeyPatch) -> None:
+    def refuse(_: Path) -> None:
+        raise PermissionError(13, "Permission denied")
+
+    monkeypatch.setattr(Path, "iterdir", refuse)
+    code, out, err = run("table", ".")
+    assert (code, out) == (2, "")
+    assert err == "regrasp-lp table: error: .: cannot be read: Permission denied\n"
 
 
 # --- show ---------------------------------------------------------------------------------------
@@ -774,6 +949,19 @@ def test_plan_shows_progress_of_long_work(run: Run, monkeypatch: pytest.MonkeyPa
     code, out, err = run("plan", "stars.geojson", "--name", "star_25", "--friction", "0.2")
     assert (code, err) == (0, "")
     assert "planning" in terminal.getvalue()
+    assert "\r" not in out
+
+
+def test_table_shows_which_polygon_is_being_done(run: Run, monkeypatch: pytest.MonkeyPatch) -> None:
+    terminal = Terminal()
+    original = ProgressBar.__init__
+    monkeypatch.setattr("regrasp_lp.cli.progress._REDRAW", 0.001)
+    monkeypatch.setattr(ProgressBar, "__init__", lambda bar: original(bar, terminal, after=0.0))
+    code, out, err = run("table", "stars.geojson", "--sets", "complete")
+    assert (code, err) == (0, "")
+    drawn = terminal.getvalue()
+    assert "star_40 (3 of 3): switches  [" in drawn
+    assert max(map(len, drawn.split("\r"))) < 80
     assert "\r" not in out
 
 

@@ -54,6 +54,10 @@ def test_networkx_agrees(name: str, fingers: int, sets: str) -> None:
     assert graph.n_switches == explicit.number_of_edges()
     components = sorted(nx.connected_components(explicit), key=lambda c: (-len(c), min(c)))
     assert graph.components() == components
+    for kind, counts in graph.summary().kinds.items():
+        alone = explicit.subgraph(i for i, of in explicit.nodes(data="kind") if of == kind)
+        assert counts.sets == len(alone)
+        assert counts.components == nx.number_connected_components(alone)
     for i in explicit.nodes:
         assert graph.neighbors(i) == sorted(explicit[i])
     for i, data in explicit.nodes(data=True):
@@ -329,6 +333,7 @@ def test_switches_on_demand_are_the_stored_ones(
     assert isinstance(demanded.switches, SwitchesOnDemand)
     assert_same(stored, demanded, 0.0)
     assert stored.n_switches == demanded.n_switches
+    assert stored.summary().kinds == demanded.summary().kinds
     for i in range(len(stored)):
         assert stored.neighbors(i) == demanded.neighbors(i)
         for one, other in zip(
@@ -422,16 +427,22 @@ def test_summary() -> None:
     summary = graph.summary()
     text = str(summary)
     assert text.startswith("block: 4 edges\n")
-    for kind in ("two_finger", "concurrent", "parallel", "all"):
-        count = sum(s.kind == kind for s in graph.sets) if kind != "all" else len(graph)
+    assert list(summary.kinds) == ["two_finger", "concurrent", "parallel"]
+    for kind in (*summary.kinds, "all"):
         (line,) = [line for line in text.splitlines() if line.split()[:1] == [kind]]
-        assert int(line.split()[-1]) == count
+        *_, sets, components = map(int, line.split()[1:])
+        if kind == "all":
+            assert (sets, components) == (len(graph), len(graph.components()))
+        else:
+            assert sets == sum(s.kind == kind for s in graph.sets)
+            assert components == summary.kinds[kind].components
     assert f"switches    {graph.n_switches}\n" in text
     assert f"components  {len(graph.components())} (sizes " in text
     assert set(summary.seconds) == set(graph.seconds) == {"sets", "switches"}
     assert all(seconds >= 0 for seconds in summary.seconds.values())
-    assert summary.n_sets == sum(sets for _, sets in summary.kinds.values())
-    assert all(candidates >= sets for candidates, sets in summary.kinds.values())
+    assert summary.n_sets == sum(counts.sets for counts in summary.kinds.values())
+    for counts in summary.kinds.values():
+        assert counts.candidates >= counts.sets >= counts.components
     unnamed = rl.build_switching_graph(rectangle(), 0.4).summary()
     assert str(unnamed).startswith("unnamed polygon: 4 edges")
 

@@ -1,4 +1,4 @@
-"""The command line ``regrasp-lp``: plan, graph, show and check.
+"""The command line ``regrasp-lp``: plan, graph, table, show and check.
 
 Results go to standard output; errors, one line each, and the progress bar to standard error.
 Nothing else in the package prints.
@@ -12,6 +12,7 @@ import sys
 from collections.abc import Sequence
 
 from regrasp_lp.cli.arguments import PROGRAM, UsageError, build_parser, read_command_line
+from regrasp_lp.cli.progress import complain
 from regrasp_lp.errors import NoPlanFound, RegraspError
 
 __all__ = ["main"]
@@ -73,8 +74,7 @@ def _run(arguments: Sequence[str]) -> int:
 
 
 def _fail(program: str, message: str, code: int) -> int:
-    if sys.stderr is not None:
-        print(f"{program}: {' '.join(message.split())}", file=sys.stderr)
+    complain(program, message)
     return code
 
 

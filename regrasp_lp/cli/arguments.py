@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import argparse
+import math
 import re
 from collections.abc import Callable, Sequence
 from typing import Any, NoReturn
@@ -27,6 +28,7 @@ examples:
   regrasp-lp show parts.geojson --name l_bracket
   regrasp-lp plan parts.geojson --name l_bracket --friction 0.3
   regrasp-lp graph parts.geojson --friction 0.2
+  regrasp-lp table parts.geojson
 
 exit codes:
   0  done
@@ -64,6 +66,25 @@ examples:
   regrasp-lp graph parts.geojson --friction 0.2
   regrasp-lp graph parts.geojson --name hex_nut --friction 0.2 --sets chapter
   regrasp-lp graph parts.geojson --name hex_nut --friction 0.2 --save nut.npz"""
+
+_TABLE = """\
+Compute the graphs of many polygons and put their numbers into one table: for
+each kind of grasp sets how many there are, of how many candidates (cand.), and
+in how many connected components (comp.) by themselves; then of all combined
+the sets, their components and the switches; and how long it took. The columns
+are those of the chapter's tables 3.1 and 3.2, and so are, by default, the sets
+and the rule for switches. The hand has four fingers."""
+
+_TABLE_EXAMPLES = """\
+examples:
+  regrasp-lp table parts.geojson
+  regrasp-lp table . --max-edges 40 -o table.csv
+  regrasp-lp table parts.geojson --sets complete --friction 0.2 -o table.md
+
+exit codes:
+  0  the table is complete
+  2  an error: standard error names each file that could not be read and each
+     polygon that could not be computed; the table is without them"""
 
 _SHOW = """\
 Draw an object with the numbers of its edges, or list them. Edges are numbered
@@ -174,7 +195,7 @@ def build_parser() -> argparse.ArgumentParser:
 
     graph = command("graph", "summarise all grasps and switches", _GRAPH, _GRAPH_EXAMPLES)
     _add_object(graph, "all of them by default")
-    _add_model(graph)
+    _add_switching(_add_model(graph), "contact")
     graph.add_argument(
         "--min-margin",
         type=values.length,
@@ -185,6 +206,44 @@ def build_parser() -> argparse.ArgumentParser:
     )
     files = graph.add_argument_group("files to write")
     _add_output(files, "--save", values.output_file, "the graph, for regrasp_lp.load_graph")
+
+    table = command("table", "tabulate the graphs of many polygons", _TABLE, _TABLE_EXAMPLES)
+    table.add_argument(
+        "paths",
+        nargs="+",
+        metavar="PATH",
+        help="polygons, as GeoJSON or as WKT, or a folder: all its files *.geojson and *.wkt, by "
+        "name",
+    )
+    _add_sets(table, "chapter")
+    _add_switching(table, None)
+    table.add_argument(
+        "--friction",
+        type=values.one_friction,
+        default=math.tan(math.radians(10)),
+        metavar="MU",
+        help="coefficient of friction of all edges (default: the tangent of 10°, about "
+        "0.1763; the chapter gives no angle for its tables, but their numbers fit about this one)",
+    )
+    table.add_argument(
+        "--max-edges",
+        type=values.edges,
+        default=math.inf,
+        metavar="N",
+        help="leave out polygons of more edges",
+    )
+    table.add_argument(
+        "--format",
+        choices=("text", "csv", "markdown"),
+        help="how the table is written (default: by the suffix of OUT, .csv or .md, else text)",
+    )
+    table.add_argument(
+        "-o",
+        "--output",
+        type=values.output_file,
+        metavar="OUT",
+        help="where to write the table (default: standard output)",
+    )
 
     show = command("show", "draw an object with its edge numbers", _SHOW, _SHOW_EXAMPLES)
     _add_object(show, "needed if the file holds several")
@@ -247,7 +306,7 @@ def _add_grasps(parser: argparse.ArgumentParser) -> None:
     )
 
 
-def _add_model(parser: argparse.ArgumentParser) -> None:
+def _add_model(parser: argparse.ArgumentParser) -> Any:
     group = parser.add_argument_group("friction, hand and grasps")
     group.add_argument(
         "--friction",
@@ -263,20 +322,37 @@ def _add_model(parser: argparse.ArgumentParser) -> None:
         metavar="K",
         help="fingers of the hand, 3 or more (default: 4)",
     )
-    group.add_argument(
-        "--sets",
-        choices=("complete", "chapter"),
-        default="complete",
-        help="all force-closure grasps of 2 and 3 fingers (default), or the two-finger, "
-        "concurrent and parallel grasps only",
-    )
+    _add_sets(group, "complete")
     group.add_argument(
         "--solver",
         choices=("clarabel", "highs"),
         default="clarabel",
         help="solver of the linear programs (default: clarabel)",
     )
+    return group
 
 
 def _add_output(group: Any, option: str, reader: Callable[[str], Any], what: str) -> None:
     group.add_argument(option, type=reader, metavar="OUT", help=what)
+
+
+def _add_sets(group: Any, default: str) -> None:
+    group.add_argument(
+        "--sets",
+        choices=("complete", "chapter"),
+        default=default,
+        help="complete: all force-closure grasps of 2 and 3 fingers; chapter: the two-finger, "
+        f"concurrent and parallel grasps only (default: {default})",
+    )
+
+
+def _add_switching(group: Any, default: str | None) -> None:
+    described = default or "focus for chapter, contact for complete sets"
+    group.add_argument(
+        "--switching",
+        choices=("contact", "focus"),
+        default=default,
+        help="which sets are adjacent. contact: those whose grasps can hold enough contacts in "
+        "common; focus: those whose focus cells meet, the chapter's rule for chapter sets and "
+        f"four fingers (default: {described})",
+    )

@@ -8,13 +8,16 @@ import io
 import re
 from argparse import Namespace
 from collections.abc import Callable, Iterator
+from itertools import chain
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import regrasp_lp
 from regrasp_lp import Grasp, Hand, Plan, Polygon, SwitchingGraph
+from regrasp_lp.cli.arguments import PROGRAM
 from regrasp_lp.cli.far_apart import far_apart
-from regrasp_lp.cli.progress import ProgressBar
+from regrasp_lp.cli.progress import ProgressBar, complain
+from regrasp_lp.cli.tables import attempt, polygon_files, summaries_of
 from regrasp_lp.cli.values import PICTURES, grasp_text
 from regrasp_lp.errors import (
     ContactError,
@@ -28,6 +31,7 @@ from regrasp_lp.files import write_atomically
 from regrasp_lp.friction import FloatArray, per_edge_friction
 from regrasp_lp.planning.planner import checked_grasp
 from regrasp_lp.switches import SwitchesOnDemand
+from regrasp_lp.tables import csv_table, markdown_table, text_table
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -35,6 +39,7 @@ if TYPE_CHECKING:
 _MOST_NAMES = 12  # listed in a message
 _SNAP = 1e-3  # of the diagonal of the object's bounding box: what a reader of a drawing can do
 _ROLES = ("start", "goal")
+_TABLES = {"text": text_table, "csv": csv_table, "markdown": markdown_table}
 
 
 def plan(options: Namespace) -> int:
@@ -95,6 +100,7 @@ def _built(
         friction,
         hand,
         sets=options.sets,
+        switching=getattr(options, "switching", "contact"),
         min_margin=getattr(options, "min_margin", 0.0),
         solver=options.solver,
         progress=bar,
@@ -120,6 +126,49 @@ def graph(options: Namespace) -> int:
             with _writing(options.save):
                 built.save(options.save)
     return 0
+
+
+def table(options: Namespace) -> int:
+    """Print one table of the graphs of many polygons."""
+    folders, missing = attempt(polygon_files, options.paths)
+    files = list(chain.from_iterable(folders))
+    for file in files:
+        _check_outputs(file, options.output)
+    contents, damaged = attempt(regrasp_lp.read_polygons, files)
+    _complain(options, missing + damaged)
+    polygons = _small_ones(list(chain.from_iterable(contents)), options)
+    summaries, failed = summaries_of(polygons, options)
+    _complain(options, failed)
+    if summaries:
+        text = _TABLES[_table_format(options)](summaries)
+        if options.output is None:
+            print(text, end="", flush=True)
+        else:
+            with _writing(options.output):
+                write_atomically(options.output, text)
+    return 2 if missing or damaged or failed else 0
+
+
+def _small_ones(polygons: list[Polygon], options: Namespace) -> list[Polygon]:
+    small = [polygon for polygon in polygons if polygon.n_edges <= options.max_edges]
+    larger = len(polygons) - len(small)
+    if larger and not small:
+        raise OptionError(f"no polygon has {options.max_edges} edges or fewer: raise --max-edges")
+    if larger:
+        what = f"{_count(larger, 'polygon')} with more than {options.max_edges} edges"
+        complain(f"{PROGRAM} {options.command}", f"{what} left out")
+    return small
+
+
+def _complain(options: Namespace, failures: list[str]) -> None:
+    for failure in failures:
+        complain(f"{PROGRAM} {options.command}", f"error: {failure}")
+
+
+def _table_format(options: Namespace) -> str:
+    by_suffix = {".csv": "csv", ".md": "markdown"}
+    suffix = "" if options.output is None else options.output.suffix.lower()
+    return options.format or by_suffix.get(suffix, "text")
 
 
 def show(options: Namespace) -> int:
@@ -270,7 +319,7 @@ def _choice_text(given: dict[str, Grasp | None], chosen: dict[str, Grasp]) -> st
 # --- files --------------------------------------------------------------------------------------
 
 
-def _check_outputs(source: str, *outputs: Path | None) -> None:
+def _check_outputs(source: str | Path, *outputs: Path | None) -> None:
     """Find out before any work whether the files can be written."""
     paths = [path for path in outputs if path is not None]
     for number, path in enumerate(paths):

@@ -1,4 +1,4 @@
-"""A progress bar on a terminal for work that takes longer than a second."""
+"""What goes to standard error: lines that say what is wrong, and a progress bar on a terminal."""
 
 from __future__ import annotations
 
@@ -12,6 +12,12 @@ from typing import TextIO
 
 _REDRAW = 0.2  # seconds
 _WIDEST = 40  # characters of the bar itself
+
+
+def complain(program: str, message: str) -> None:
+    """Print a message to standard error, on one line that begins with the program's name."""
+    if sys.stderr is not None:
+        print(f"{program}: {' '.join(message.split())}", file=sys.stderr)
 
 
 class ProgressBar:
@@ -28,11 +34,17 @@ class ProgressBar:
         Standard error by default.
     after : float, optional
         In seconds.
+
+    Attributes
+    ----------
+    subject : str
+        Which of several objects the work is about, to be shown before what is done; none at first.
     """
 
     def __init__(self, stream: TextIO | None = None, after: float = 1.0) -> None:
         self._stream = sys.stderr if stream is None else stream
         self._after = after
+        self.subject = ""
         self._state = ("", 0, 0)
         self._ended = threading.Event()
         self._thread: threading.Thread | None = None
@@ -78,6 +90,8 @@ class ProgressBar:
 
     def _line(self) -> str:
         what, done, total = self._state
+        if self.subject:
+            what = f"{' '.join(self.subject.split())}: {what}"
         columns = _columns(self._stream)
         elapsed = f"{time.monotonic() - self._started:.0f} s"
         if total <= 0:

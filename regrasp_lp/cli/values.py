@@ -74,6 +74,16 @@ def friction(text: str) -> float | list[float]:
     return values[0] if len(values) == 1 else values
 
 
+def one_friction(text: str) -> float:
+    """Read one friction coefficient, the same for all edges."""
+    value = friction(text)
+    if isinstance(value, list):
+        raise argparse.ArgumentTypeError(
+            f"{text!r} has several values; write one, for all edges of all polygons"
+        )
+    return value
+
+
 def fingers(text: str) -> int:
     """Read the number of fingers, 3 or more."""
     number = _whole(text)
@@ -81,6 +91,14 @@ def fingers(text: str) -> int:
         raise argparse.ArgumentTypeError(
             f"{text!r} is no number of fingers to regrasp with; it takes at least 3"
         )
+    return number
+
+
+def edges(text: str) -> int:
+    """Read a number of edges, 3 or more."""
+    number = _whole(text)
+    if number is None or number < 3:
+        raise argparse.ArgumentTypeError(f"{text!r} is no number of edges; polygons have 3 or more")
     return number
 
 

@@ -9,12 +9,18 @@ from itertools import combinations
 from typing import overload
 
 import numpy as np
+from numpy.typing import ArrayLike
 
 from regrasp_lp.contact import Contact, Grasp
+from regrasp_lp.errors import OptionError
 from regrasp_lp.friction import FloatArray, IntArray
+from regrasp_lp.grasp_sets.double_cones import contact_pieces, sided_pieces
+from regrasp_lp.grasp_sets.focus import focus_cell, independent_regions
+from regrasp_lp.grasp_sets.parallel import common_cone_rays, outer_regions, subpolytopes
 from regrasp_lp.grasp_sets.pieces import in_positions, piece_sets
 from regrasp_lp.grasp_sets.vertices import Family
 from regrasp_lp.linear_sets import LinearSets
+from regrasp_lp.lp import get_solver, maximise_margins
 from regrasp_lp.margins import existing_pieces
 from regrasp_lp.polygon import Polygon
 from regrasp_lp.torque import TorqueFunctions
@@ -69,6 +75,109 @@ class GraspSet:
         sets = piece_sets(self.torque, pieces, self.names)
         sets = in_positions(sets, self.torque.lengths[0])
         return _in_order(sets, self.edges)
+
+    @cached_property
+    def focus_cell(self) -> LinearSets | None:
+        """The pieces of the focus cell, over "x" and "y", widest first.
+
+        Of a concurrent or a two-finger set (chapter, sections 3.3.1.1 and 3.3.1.2); None of others.
+        The margin of a point is its distance to the boundary of the piece.
+        """
+        if self.kind not in ("concurrent", "two_finger"):
+            return None
+        return focus_cell(self.torque.cones, np.array(self.edges))
+
+    @cached_property
+    def double_cones(self) -> LinearSets | None:
+        """The pieces by sides over the contact positions and the focus point, widest first.
+
+        Of a concurrent set: ``s_i (q - p_i)`` in the cone of each contact, over `names`, "x" and
+        "y" (chapter, Propositions 3.4 and 3.6); None of others.
+        """
+        if self.kind != "concurrent":
+            return None
+        cones, edges = self.torque.cones, np.array([self.edges])
+        names, lengths = self.names, self.torque.lengths[0]
+        widths = maximise_margins(contact_pieces(cones, edges, names), get_solver("highs"))
+        order = np.argsort(-widths.margins, kind="stable")
+        sets = sided_pieces(cones, edges, names).take(order[widths.positive[order]])
+        return in_positions(sets, [*lengths, 1.0, 1.0])
+
+    @cached_property
+    def common_cone(self) -> FloatArray | None:
+        """The boundaries of the common cone of a parallel set, clockwise first, shape (2, 2).
+
+        Unit vectors, as at the contacts that are not on the centre edge; None of other sets.
+        """
+        if self.center is None:
+            return None
+        return common_cone_rays(self.torque.cones, self.center, self._others)
+
+    @cached_property
+    def subpolytopes(self) -> LinearSets | None:
+        """The chapter's six sub-polytopes K0 to K5 of a parallel set; None of other sets.
+
+        Over `names`, closed; their margins fall to 0 at walls inside the set (see `pieces`).
+        """
+        if self.center is None:
+            return None
+        return in_positions(subpolytopes(self.torque, self.names), self.torque.lengths[0])
+
+    def outer_regions(self, position: float | None = None) -> LinearSets:
+        """Return the left and the right outer region of a parallel set, over "x" and "y".
+
+        Parameters
+        ----------
+        position : float, optional
+            Of a contact on the centre edge, at which the common cone is drawn; by default cones
+            are drawn at all of the edge (the chapter's union volume).
+
+        Raises
+        ------
+        OptionError
+            If this is no parallel set, or the position is not on its centre edge.
+        """
+        if self.center is None:
+            raise OptionError(f"outer regions are those of a parallel set; this one is {self.kind}")
+        length = float(self.torque.cones.lengths[self.center])
+        if position is not None and not 0 <= position <= length:
+            raise OptionError(
+                f"position {position!r} is not on the centre edge {self.center}, from 0 to "
+                f"{length:g}"
+            )
+        span = (0.0, 1.0) if position is None else (position / length, position / length)
+        return outer_regions(self.torque.cones, self.center, self._others, np.array(span))
+
+    def independent_regions(self, point: ArrayLike) -> FloatArray:
+        """Return the independent contact regions at a point of the focus cell.
+
+        Contacts may be anywhere in them, each on its own.
+
+        Parameters
+        ----------
+        point : array_like, shape (2,)
+
+        Returns
+        -------
+        numpy.ndarray, shape (m, 2)
+            First and last position on each edge, in the order of `edges`.
+
+        Raises
+        ------
+        OptionError
+            If the set has no focus cell, or the point is not inside it.
+        """
+        if self.focus_cell is None:
+            raise OptionError(
+                f"a {self.kind} set has no focus cell: a concurrent or two-finger does"
+            )
+        return independent_regions(
+            self.torque.cones, np.array(self.edges), self.focus_cell, np.asarray(point)
+        )
+
+    @property
+    def _others(self) -> list[int]:
+        return [edge for edge in self.edges if edge != self.center]
 
     def __contains__(self, grasp: object) -> bool:
         """Whether a grasp on exactly these edges is strictly inside, decided exactly."""

@@ -1,0 +1,72 @@
+"""Corners of bounded linear sets, for pictures and for projections."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.spatial import ConvexHull, HalfspaceIntersection
+
+from regrasp_lp.linear_sets import FloatArray, LinearSets
+from regrasp_lp.lp import get_solver, maximise_margins
+
+_FLAT = 1e-9
+"""Sets thinner than this part of their box have no corners."""
+
+
+def corners(sets: LinearSets) -> list[FloatArray]:
+    """Return the corners of each set of a stack, without regard to margins.
+
+    Parameters
+    ----------
+    sets : LinearSets
+        Over two or three coordinates, in boxes that are bounded.
+
+    Returns
+    -------
+    list of numpy.ndarray, shape (K, n)
+        In the plane counter-clockwise. Empty where the set has no interior.
+
+    Examples
+    --------
+    >>> half = LinearSets(("x", "y"), np.array([[[1.0, 1.0]]]), np.ones((1, 1)), np.ones((1, 1)),
+    ...                   np.zeros((1, 2)), np.ones((1, 2)))
+    >>> corners(half)[0].round(6).tolist()
+    [[0.0, 0.0], [1.0, 0.0], [0.0, 1.0]]
+    """
+    if not len(sets):
+        return []
+    unit = sets.upper - sets.lower
+    halfspaces = _in_unit_box(sets, unit)
+    solutions = maximise_margins(halfspaces, get_solver("highs"))
+    found = []
+    for k in range(len(sets)):
+        if solutions.margins[k] <= _FLAT:
+            found.append(np.zeros((0, len(sets.names))))
+            continue
+        rows = np.column_stack((halfspaces.rows[k], -halfspaces.bounds[k]))
+        used = np.abs(rows[:, :-1]).max(axis=1) > 0
+        points = HalfspaceIntersection(rows[used], solutions.points[k]).intersections
+        hull = ConvexHull(points)
+        found.append(np.clip(points[_first(hull)], 0.0, 1.0) * unit[k] + sets.lower[k])
+    return found
+
+
+def _in_unit_box(sets: LinearSets, unit: FloatArray) -> LinearSets:
+    """Rows of length 1, those of the box among them, over coordinates from 0 to 1."""
+    b, n = sets.lower.shape
+    rows = sets.rows * unit[:, None, :]
+    bounds = sets.bounds - np.einsum("brn,bn->br", sets.rows, sets.lower)
+    length = np.linalg.norm(rows, axis=2)
+    length = np.where(length > 0, length, 1.0)
+    box = np.tile(np.concatenate((np.eye(n), -np.eye(n))), (b, 1, 1))
+    limits = np.tile(np.concatenate((np.ones(n), np.zeros(n))), (b, 1))
+    rows = np.concatenate((rows / length[..., None], box), axis=1)
+    scales = np.where(np.abs(rows).max(axis=2) > 0, 1.0, 0.0)
+    bounds = np.concatenate((bounds / length, limits), axis=1)
+    return LinearSets(sets.names, rows, scales, bounds, np.zeros((b, n)), np.ones((b, n)))
+
+
+def _first(hull: ConvexHull) -> NDArray[np.intp]:
+    """The corners of a hull; of a polygon counter-clockwise from the lowest index."""
+    order = np.asarray(hull.vertices, dtype=np.intp)
+    return np.roll(order, -int(np.argmin(order))) if hull.points.shape[1] == 2 else order
