@@ -59,7 +59,8 @@ def build_switching_graph(
         of concurrent and two-finger sets that the interiors of their focus cells meet: its edges
         are a subset. It is for the chapter's sets and hand (four fingers).
     min_margin : float
-        Drop sets and switches whose best margin is not larger, in the object's unit.
+        Drop sets and switches whose best margin is not larger, in the object's unit. That of a
+        switch is the margin of its grasps, also under the focus rule.
     solver : {"clarabel", "highs"}
     presolve : bool
         Decide by signs of torque functions and intervals (exact), and let the solver find margins

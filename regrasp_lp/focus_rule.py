@@ -93,10 +93,10 @@ class FocusRule:
                 found[rows] = self._sweeps.any_meet(regions)
                 continue
             for part in np.array_split(np.arange(len(rows)), len(rows) // _CHUNK + 1):
-                found[rows[part]] = self._any_wide(regions[part], solver)
+                found[rows[part]] = self._any_meet_by_lp(regions[part], solver)
         return found
 
-    def _any_wide(self, regions: IntArray, solver: Solver) -> BoolArray:
+    def _any_meet_by_lp(self, regions: IntArray, solver: Solver) -> BoolArray:
         """Whether some choice of regions has an intersection of positive margin, by LP."""
         k, c, r = regions.shape
         solutions = maximise_margins(self._sweeps.linear_sets(regions.reshape(k * c, r)), solver)

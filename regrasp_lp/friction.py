@@ -152,8 +152,9 @@ class Directions:
         ``c (α1 α2 + β1 β2) + d (β1 α2 − α1 β2)``. Each of the two terms carries at most eight
         roundings, each relative to the sum of the magnitudes of its products, so 16 unit
         roundoffs of these magnitudes bound the error. Where every product has a factor 0, it is 0.
-        Values of nearly parallel directions are taken from integers, so that they too have full
-        relative accuracy; their signs are too, for a value may be smaller than any double.
+        Values of nearly parallel directions are taken from integers, so that all have a
+        relative accuracy of 1e-9 or better; their signs are too, for a value may be smaller than
+        any double.
         """
         x, y = self.vectors.T
         xy, yx = np.outer(x, y), np.outer(y, x)
@@ -194,7 +195,7 @@ class Directions:
 
     @property
     def cross(self) -> FloatArray:
-        """``d_r × d_s`` of all pairs, to full relative accuracy, shape (n k, n k)."""
+        """``d_r × d_s`` of all pairs, to a relative accuracy of 1e-9 or better, (n k, n k)."""
         return self._crosses[0]
 
     @property
@@ -328,7 +329,7 @@ class Cones:
 
     @property
     def cross(self) -> FloatArray:
-        """``e_r × e_s`` of all pairs of rays, to full relative accuracy, shape (2 n, 2 n)."""
+        """``e_r × e_s`` of all pairs of rays, relatively accurate to 1e-9, shape (2 n, 2 n)."""
         return self.boundary.cross
 
     @property

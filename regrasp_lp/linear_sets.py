@@ -100,6 +100,13 @@ class LinearSets:
         """Return the same sets over other names, in the same order."""
         return replace(self, names=tuple(names))
 
+    def translate(self, offsets: Mapping[str, float]) -> LinearSets:
+        """Return the sets moved along some of their coordinates."""
+        by = np.array([float(offsets.get(name, 0.0)) for name in self.names])
+        return replace(
+            self, bounds=self.bounds + self.rows @ by, lower=self.lower + by, upper=self.upper + by
+        )
+
     def margins(self, points: FloatArray) -> FloatArray:
         """Return the margin of one point per set; -inf outside the box.
 

@@ -37,17 +37,17 @@ def corners(sets: LinearSets) -> list[FloatArray]:
         return []
     unit = sets.upper - sets.lower
     halfspaces = _in_unit_box(sets, unit)
-    solutions = maximise_margins(halfspaces, get_solver("highs"))
-    found = []
-    for k in range(len(sets)):
-        if solutions.margins[k] <= _FLAT:
-            found.append(np.zeros((0, len(sets.names))))
-            continue
-        rows = np.column_stack((halfspaces.rows[k], -halfspaces.bounds[k]))
-        used = np.abs(rows[:, :-1]).max(axis=1) > 0
-        points = HalfspaceIntersection(rows[used], solutions.points[k]).intersections
-        hull = ConvexHull(points)
-        found.append(np.clip(points[_first(hull)], 0.0, 1.0) * unit[k] + sets.lower[k])
+    void = np.abs(halfspaces.rows).max(axis=2) == 0
+    empty = (unit <= 0).any(axis=1) | (void & (halfspaces.bounds < 0)).any(axis=1)
+    found = [np.zeros((0, len(sets.names)))] * len(sets)
+    kept = np.flatnonzero(~empty)
+    solutions = maximise_margins(halfspaces.take(kept), get_solver("highs"))
+    for k, margin, inside in zip(kept, solutions.margins, solutions.points, strict=True):
+        if margin > _FLAT:
+            rows = np.column_stack((halfspaces.rows[k], -halfspaces.bounds[k]))[~void[k]]
+            points = _apart(HalfspaceIntersection(rows, inside).intersections)
+            hull = ConvexHull(points)
+            found[k] = np.clip(points[_first(hull)], 0.0, 1.0) * unit[k] + sets.lower[k]
     return found
 
 
@@ -66,7 +66,15 @@ def _in_unit_box(sets: LinearSets, unit: FloatArray) -> LinearSets:
     return LinearSets(sets.names, rows, scales, bounds, np.zeros((b, n)), np.ones((b, n)))
 
 
+def _apart(points: FloatArray) -> FloatArray:
+    """The points but those that rounding alone tells from an earlier one."""
+    near = np.abs(points[:, None] - points[None, :]).max(axis=2) < _FLAT
+    return np.asarray(points[~np.tril(near, -1).any(axis=1)])
+
+
 def _first(hull: ConvexHull) -> NDArray[np.intp]:
-    """The corners of a hull; of a polygon counter-clockwise from the lowest index."""
+    """The corners of a hull; of a polygon counter-clockwise from its leftmost corner."""
     order = np.asarray(hull.vertices, dtype=np.intp)
-    return np.roll(order, -int(np.argmin(order))) if hull.points.shape[1] == 2 else order
+    if hull.points.shape[1] > 2:
+        return order
+    return np.roll(order, -int(np.lexsort(hull.points[order].round(9).T[::-1])[0]))

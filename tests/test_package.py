@@ -20,23 +20,28 @@ TEXT = """
 errors
 contact  rings  ring_checks  polygon  wkt  files
 friction  wrenches  force_closure
-torque  margins
+circuits  torque  margins
 linear_sets
 lp.margin_lp  lp.highs_solver  lp.clarabel_solver  lp
+polytopes
 grasp_sets  grasp_sets.candidates  grasp_sets.families  grasp_sets.pieces  grasp_sets.vertices
+grasp_sets.sweeps  grasp_sets.focus  grasp_sets.double_cones  grasp_sets.parallel
 grasp_sets.collection
 quality
 planning  planning.hand  planning.steps
-shadows  switching  joins  handovers  switches
+shadows  switching  joins  handovers  focus_rule  switches
 planning.plan_document  planning.verification  planning.plan  planning.plan_file  planning.account
 planning.search  planning.aligning  planning.path_lp  planning.regrip  planning.hops
 planning.execution
 planning.planner  planning.on_demand
-summary  switching_graph  build  graph_file
+summary  tables  switching_graph  build  graph_file
 plotting.palette  plotting.placement  plotting.frame  plotting.outline  plotting.grasps
+plotting.scene  plotting.focus_cells  plotting.focus_switch  plotting.parallel_sets
+plotting.friction_cones
+plotting.regions  plotting.contact_space  plotting.normals  plotting.graph
 plotting.filmstrip  plotting
 __init__
-cli.progress  cli.values  cli.far_apart  cli.arguments  cli.commands  cli
+cli.progress  cli.values  cli.far_apart  cli.tables  cli.arguments  cli.commands  cli
 __main__
 """
 ORDER = TEXT.split()
@@ -250,6 +255,11 @@ def test_everything_public_is_documented() -> None:
             for member, entry in vars(value).items():
                 if not member.startswith("_") and callable(entry):
                     assert inspect.getdoc(getattr(value, member)), f"{name}.{member}"
+
+
+def test_citation_names_this_version() -> None:
+    lines = (REPOSITORY / "CITATION.cff").read_text(encoding="utf-8").splitlines()
+    assert f"version: {rl.__version__}" in lines
 
 
 def test_package_data() -> None:

@@ -15,9 +15,10 @@ from regrasp_lp.contact import Contact, Grasp
 from regrasp_lp.errors import OptionError
 from regrasp_lp.friction import FloatArray, IntArray
 from regrasp_lp.grasp_sets.double_cones import contact_pieces, sided_pieces
-from regrasp_lp.grasp_sets.focus import focus_cell, independent_regions
+from regrasp_lp.grasp_sets.focus import cell_pieces, focus_cell, independent_regions
 from regrasp_lp.grasp_sets.parallel import common_cone_rays, outer_regions, subpolytopes
 from regrasp_lp.grasp_sets.pieces import in_positions, piece_sets
+from regrasp_lp.grasp_sets.sweeps import Sweeps
 from regrasp_lp.grasp_sets.vertices import Family
 from regrasp_lp.linear_sets import LinearSets
 from regrasp_lp.lp import get_solver, maximise_margins
@@ -98,10 +99,10 @@ class GraspSet:
             return None
         cones, edges = self.torque.cones, np.array([self.edges])
         names, lengths = self.names, self.torque.lengths[0]
-        widths = maximise_margins(contact_pieces(cones, edges, names), get_solver("highs"))
-        order = np.argsort(-widths.margins, kind="stable")
-        sets = sided_pieces(cones, edges, names).take(order[widths.positive[order]])
-        return in_positions(sets, [*lengths, 1.0, 1.0])
+        widths = maximise_margins(contact_pieces(cones, edges, names), get_solver("highs")).margins
+        order = np.argsort(-widths, kind="stable")
+        order = order[Sweeps.of_cones(cones).meet(cell_pieces(edges)[0])[order]]
+        return in_positions(sided_pieces(cones, edges, names).take(order), [*lengths, 1.0, 1.0])
 
     @cached_property
     def common_cone(self) -> FloatArray | None:
@@ -151,7 +152,7 @@ class GraspSet:
     def independent_regions(self, point: ArrayLike) -> FloatArray:
         """Return the independent contact regions at a point of the focus cell.
 
-        Contacts may be anywhere in them, each on its own.
+        Contacts may be anywhere inside them, each on its own.
 
         Parameters
         ----------
@@ -171,9 +172,13 @@ class GraspSet:
             raise OptionError(
                 f"a {self.kind} set has no focus cell: a concurrent or two-finger does"
             )
-        return independent_regions(
-            self.torque.cones, np.array(self.edges), self.focus_cell, np.asarray(point)
-        )
+        try:
+            q = np.array(point, dtype=np.float64)
+        except (TypeError, ValueError):
+            q = np.zeros(0)
+        if q.shape != (2,) or not np.isfinite(q).all():
+            raise OptionError(f"a focus point is a pair of coordinates, got {point!r}")
+        return independent_regions(self.torque.cones, np.array(self.edges), self.focus_cell, q)
 
     @property
     def _others(self) -> list[int]:

@@ -3,9 +3,11 @@
 Contact i sees the focus point q on side ``s_i = ±1`` iff ``s_i (q - p_i(u_i))`` is in its cone:
 two rows, linear in q and u. Each of the eight choices of sides is a convex piece of the set in the
 five coordinates (u, q), and the set is the union of their projections on u (Propositions 3.4 and
-3.6). Projecting leaves q out: with the boundary rays, signed by their sides, as normals of
-half-planes of q, the half-planes have a common point iff each circuit of them has
-``Σ λ_k h_k(u) <= 0``.
+3.6), but for grasps of which two contacts coincide at a corner of the object: their cones may meet
+in that corner only.
+
+Projecting leaves q out: with the boundary rays, signed by their sides, as normals of half-planes of
+q, the half-planes have a common point iff each circuit of them has ``Σ λ_k h_k(u) <= 0``.
 """
 
 from __future__ import annotations
@@ -16,7 +18,7 @@ import numpy as np
 
 from regrasp_lp.circuits import circuit_weights, circuits, cross
 from regrasp_lp.friction import Cones, FloatArray, IntArray
-from regrasp_lp.grasp_sets.focus import cell_pieces
+from regrasp_lp.grasp_sets.focus import cell_pieces, in_object
 from regrasp_lp.grasp_sets.sweeps import Sweeps, sides_of
 from regrasp_lp.linear_sets import LinearSets
 
@@ -46,19 +48,17 @@ def sided_pieces(cones: Cones, edges: IntArray, names: Sequence[str]) -> LinearS
     rows = np.zeros((len(ray), 6, 5))
     rows[:, np.arange(6), slot] = along
     rows[:, :, 3], rows[:, :, 4] = -d[..., 1], d[..., 0]
-    # torques are about the lower left corner, the focus point is in the object's coordinates
-    corner = cones.starts.min(axis=0)
-    bounds = rows[:, :, 3:] @ corner - at
     plane = Sweeps.of_cones(cones).linear_sets(cell_pieces(edges).reshape(-1, 3))
     box = np.zeros((len(ray), 3)), np.ones((len(ray), 3))
-    return LinearSets(
+    sets = LinearSets(
         (*names, "x", "y"),
         rows,
-        np.ones(bounds.shape),
-        bounds,
+        np.ones(at.shape),
+        -at,
         np.concatenate((box[0], plane.lower), axis=1),
         np.concatenate((box[1], plane.upper), axis=1),
     )
+    return in_object(cones, sets)
 
 
 def contact_pieces(cones: Cones, edges: IntArray, names: Sequence[str]) -> LinearSets:

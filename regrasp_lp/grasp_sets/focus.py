@@ -1,12 +1,13 @@
 """Focus cells: grasp sets as regions of the plane (chapter, sections 3.3.1.1 and 3.3.1.2).
 
 A point q of the focus cell of a set defines an *independent contact region* on each edge: the
-contacts that see q through their double-sided cones, and any choice of contacts in the regions of
-q is a grasp. The cell of a concurrent set is the union of ``W_a ∩ W_b ∩ W_c`` over the eight
-choices of a side, ``W_i = E_i ⊕ ±C_i``. The cell of a two-finger set has the narrower cone
-``C = C_a ∩ -C_b`` and the contacts on opposite sides of q,
-``(E_a ⊕ s C) ∩ (E_b ⊕ -s C)``: built from whole double-sided cones, as the chapter does, it would
-hold points whose regions hold no grasp.
+contacts that see q through their double-sided cones. Any choice of contacts inside the regions of
+q is a grasp (at their ends it may be marginal).
+
+The cell of a concurrent set is the union of ``W_a ∩ W_b ∩ W_c`` over the eight choices of a side,
+``W_i = E_i ⊕ ±C_i``. The cell of a two-finger set has the narrower cone ``C = C_a ∩ -C_b`` and the
+contacts on opposite sides of q, ``(E_a ⊕ s C) ∩ (E_b ⊕ -s C)``: built from whole double-sided
+cones, as the chapter does, pairs without a grasp would have a cell too.
 """
 
 from __future__ import annotations
@@ -90,13 +91,19 @@ def focus_cell(cones: Cones, edges: IntArray) -> LinearSets:
     sweeps, pieces = _sweeps(cones, edges[None]), cell_pieces(edges[None])[0]
     sets = sweeps.linear_sets(pieces[sweeps.meet(pieces)])
     margins = maximise_margins(sets, get_solver("highs")).margins
-    return sets.take(np.argsort(-margins, kind="stable"))
+    return in_object(cones, sets.take(np.argsort(-margins, kind="stable")))
+
+
+def in_object(cones: Cones, sets: LinearSets) -> LinearSets:
+    """Return sets over "x" and "y" from the lower left corner in the object's coordinates."""
+    x, y = cones.starts.min(axis=0).tolist()
+    return sets.translate({"x": x, "y": y})
 
 
 def independent_regions(
     cones: Cones, edges: IntArray, cell: LinearSets, point: FloatArray
 ) -> FloatArray:
-    """Return the independent contact regions at a point of a focus cell.
+    """Return the independent contact regions at a point inside a focus cell.
 
     On the edge ``a + u t`` the contacts that see q through a cone with boundaries d are those
     between ``u = (q - a) × d / t × d`` of the two: one formula for both sides.
@@ -119,8 +126,6 @@ def independent_regions(
     OptionError
         If the point is not inside the focus cell.
     """
-    if point.shape != (2,) or not np.isfinite(point).all():
-        raise OptionError(f"a focus point is a pair of coordinates, got {point.tolist()!r}")
     if not (cell.margins(np.tile(point, (len(cell), 1))) > 0).any():
         names = ", ".join(map(str, edges.tolist()))
         raise OptionError(

@@ -15,9 +15,11 @@ point iff ``Σ λ_k p_k × d_k < 0``.
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from itertools import combinations, product
+from typing import TypeAlias
 
 import numpy as np
 
@@ -36,6 +38,20 @@ from regrasp_lp.linear_sets import LinearSets
 _ROUNDINGS = 64 * UNIT_ROUNDOFF
 _OTHERS = ((1, 2), (2, 0), (0, 1))  # than line 0, 1 and 2
 _NEARLY = 1e-6  # a corner of a set, as far as rounding lets one tell
+
+
+LineChoice: TypeAlias = tuple[tuple[int, int], ...]
+"""Some lines of some regions: (region, line) each."""
+
+_PAIRS = tuple(combinations(range(3), 2))
+_OF_TWO: tuple[LineChoice, ...] = (
+    *(((0, i), (0, j), (1, k)) for i, j in _PAIRS for k in range(3)),
+    *(((0, k), (1, i), (1, j)) for i, j in _PAIRS for k in range(3)),
+    *(((0, i), (1, j)) for i, j in product(range(3), repeat=2)),
+)
+_OF_THREE: tuple[LineChoice, ...] = tuple(
+    ((0, i), (1, j), (2, k)) for i, j, k in product(range(3), repeat=3)
+)
 
 
 @dataclass(frozen=True, eq=False)
@@ -114,22 +130,14 @@ class Sweeps:
         Returns
         -------
         LinearSets
-            K sets of 3 r rows, in the coordinates of the object.
+            K sets of 3 r rows; coordinates are from the lower left corner of the object.
         """
         lines = (3 * regions[..., None] + np.arange(3)).reshape(len(regions), -1)
         d, p = self._directions[lines], self._points[lines]
         rows = np.stack((-d[..., 1], d[..., 0]), axis=-1)
         bounds = np.einsum("krx,krx->kr", rows, p)
-        corner = self.cones.starts.min(axis=0)
-        lower, upper = _box(rows, bounds, self.cones.size)
-        return LinearSets(
-            ("x", "y"),
-            rows,
-            np.ones(bounds.shape),
-            bounds + rows @ corner,
-            lower + corner,
-            upper + corner,
-        )
+        box = _box(rows, bounds, self.cones.size)
+        return LinearSets(("x", "y"), rows, np.ones(bounds.shape), bounds, *box)
 
     def any_meet(self, regions: IntArray) -> BoolArray:
         """Whether some choice of regions has an interior point in common, exactly.
@@ -152,46 +160,31 @@ class Sweeps:
         Parameters
         ----------
         regions : numpy.ndarray of int, shape (K, r)
+            Numbers of r >= 2 regions each.
 
         Returns
         -------
         numpy.ndarray of bool, shape (K,)
         """
-        test = self._three_meet if regions.shape[1] > 2 else self._two_meet
-        size = min(regions.shape[1], 3)
-        open_ = np.ones(len(regions), dtype=bool)
-        for columns in combinations(range(regions.shape[1]), size):
-            rows = np.flatnonzero(open_)
-            each, index = _distinct(np.sort(regions[rows][:, columns], axis=1), len(self))
-            open_[rows] = test(each)[index]
-        return open_
+        possible = np.ones(len(regions), dtype=bool)
+        for count, choices in ((2, _OF_TWO), (3, _OF_THREE)):
+            for columns in combinations(range(regions.shape[1]), count):
+                rows = np.flatnonzero(possible)
+                each, index = _distinct(np.sort(regions[rows][:, columns], axis=1), len(self))
+                possible[rows] = self._possible(each, choices)[index]
+        return possible
 
-    def _three_meet(self, regions: IntArray) -> BoolArray:
-        """Every two regions, and one line of each."""
-        open_ = self.meet(regions[:, :2]) if len(regions) else np.zeros(0, dtype=bool)
-        for columns in ((0, 2), (1, 2)):
-            rows = np.flatnonzero(open_)
-            open_[rows] = self.meet(regions[rows][:, columns])
-        every = [(0, i, 1, j, 2, k) for i, j, k in product(range(3), repeat=3)]
-        return self._lines_open(regions, open_, np.array(every))
-
-    def _two_meet(self, regions: IntArray) -> BoolArray:
-        """Two lines of one region and one of the other, and opposite lines."""
-        pairs = list(combinations(range(3), 2))
-        two_one = [(0, i, 0, j, 1, k) for i, j in pairs for k in range(3)]
-        one_two = [(0, k, 1, i, 1, j) for i, j in pairs for k in range(3)]
-        open_ = np.ones(len(regions), dtype=bool)
-        open_ = self._lines_open(regions, open_, np.array(two_one + one_two))
-        opposite = [(0, i, 1, j) for i, j in product(range(3), repeat=2)]
-        return self._lines_open(regions, open_, np.array(opposite))
-
-    def _lines_open(self, regions: IntArray, open_: BoolArray, choices: IntArray) -> BoolArray:
-        """Rule out what some choice of lines, (region, line) each, does not leave open."""
-        for choice in choices.reshape(len(choices), -1, 2):
-            rows = np.flatnonzero(open_)
-            lines = 3 * regions[rows][:, choice[:, 0]] + choice[:, 1]
-            open_[rows] = ~self._closed(lines)
-        return open_
+    def _possible(self, regions: IntArray, choices: Sequence[LineChoice]) -> BoolArray:
+        """Which regions none of the choices of their lines keeps from meeting."""
+        left = np.arange(len(regions))
+        for choice in choices:
+            if not left.size:
+                break
+            of_region, number = np.array(choice).T
+            left = left[~self._closed(3 * regions[left][:, of_region] + number)]
+        possible = np.zeros(len(regions), dtype=bool)
+        possible[left] = True
+        return possible
 
     def _closed(self, lines: IntArray) -> BoolArray:
         """Whether two or three half-planes are balanced and have no common interior point."""

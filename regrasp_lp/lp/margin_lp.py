@@ -21,8 +21,8 @@ _STACK = 4000
 class Solver(Protocol):
     """A linear programming code, as a value.
 
-    `solve` returns for a stack of B sets in the unit box of their own scale a point (B, n) and
-    multipliers (B, R) of the rows, as good as it could; how good they are is found out by the
+    `solve` returns for a stack of B sets in the unit box, with rows of magnitude 1, a point (B, n)
+    and multipliers (B, R) of the rows, as good as it could; how good they are is found out by the
     caller. `thorough` asks for another, slower way.
     """
 
@@ -47,7 +47,8 @@ class MarginSolutions:
     bounds : numpy.ndarray, shape (B,)
         An upper bound of the largest margin, from the multipliers by weak duality.
     units : numpy.ndarray, shape (B,)
-        What the gap is relative to: magnitude of the rows, over their least scale if below 1.
+        What the gap is relative to: magnitude of the rows over the box, over their least scale if
+        below 1.
     """
 
     points: FloatArray
@@ -107,9 +108,13 @@ def maximise_margins(
 
     Raises
     ------
+    OptionError
+        If a box is not bounded.
     SolverError
         If some LP is still open; the message says how many, and the worst gap.
     """
+    if not (np.isfinite(sets.lower).all() and np.isfinite(sets.upper).all()):
+        raise OptionError("a margin LP needs a bounded box: set lower and upper")
     parts = []
     for first in range(0, len(sets), _STACK):
         part = sets.take(np.arange(first, min(first + _STACK, len(sets))))
@@ -124,24 +129,30 @@ def maximise_margins(
 
 
 def _solve_stack(sets: LinearSets, solver: Solver) -> MarginSolutions:
+    width = sets.upper - sets.lower
+    boxed = _in_unit_box(sets, width)
     units = np.maximum(
-        np.abs(sets.rows).max(axis=(1, 2), initial=0.0),
-        np.abs(sets.bounds).max(axis=1, initial=0.0),
+        np.abs(boxed.rows).max(axis=(1, 2), initial=0.0),
+        np.abs(boxed.bounds).max(axis=1, initial=0.0),
     )
     units = np.where(units > 0, units, 1.0)
     scaled = replace(
-        sets, rows=sets.rows / units[:, None, None], bounds=sets.bounds / units[:, None]
+        boxed, rows=boxed.rows / units[:, None, None], bounds=boxed.bounds / units[:, None]
     )
     # A rounding error in a row of small scale is a large one in the margin.
     least = np.where(sets.scales > 0, sets.scales, 1.0).min(axis=1, initial=1.0)
     units = units / least
-    solution = enclose(sets, *solver.solve(scaled, thorough=False), units)
+
+    def solve(rows: NDArray[np.intp], *, thorough: bool) -> MarginSolutions:
+        points, multipliers = solver.solve(scaled.take(rows), thorough=thorough)
+        points = sets.lower[rows] + width[rows] * points
+        return enclose(sets.take(rows), points, multipliers, units[rows])
+
+    solution = solve(np.arange(len(sets)), thorough=False)
     open_ = np.flatnonzero(~solution.solved)
     if not open_.size:
         return solution
-    again = enclose(
-        sets.take(open_), *solver.solve(scaled.take(open_), thorough=True), units[open_]
-    )
+    again = solve(open_, thorough=True)
     if not again.solved.all():
         gap = np.nanmax(np.where(again.solved, 0, (again.bounds - again.margins) / again.units))
         raise SolverError(
@@ -154,6 +165,17 @@ def _solve_stack(sets: LinearSets, solver: Solver) -> MarginSolutions:
         merged[field] = getattr(solution, field).copy()
         merged[field][open_] = getattr(again, field)
     return MarginSolutions(merged["points"], merged["margins"], merged["bounds"], units)
+
+
+def _in_unit_box(sets: LinearSets, width: FloatArray) -> LinearSets:
+    """The same sets over coordinates that run from 0 to 1: solvers have absolute tolerances."""
+    return replace(
+        sets,
+        rows=sets.rows * width[:, None, :],
+        bounds=sets.bounds - np.einsum("brn,bn->br", sets.rows, sets.lower),
+        lower=np.zeros(width.shape),
+        upper=np.ones(width.shape),
+    )
 
 
 def enclose(

@@ -13,8 +13,54 @@ try:
 except ModuleNotFoundError as error:
     raise MissingExtraError("matplotlib", "plot", "drawing") from error
 
+from regrasp_lp.plotting.contact_space import (
+    ContactSpaceArtists,
+    ProjectionArtists,
+    SubpolytopeArtists,
+    plot_contact_space,
+    plot_projections,
+    plot_subpolytopes,
+)
 from regrasp_lp.plotting.filmstrip import plot_plan
+from regrasp_lp.plotting.focus_cells import FocusCellArtists, plot_focus_cell
+from regrasp_lp.plotting.focus_switch import FocusSwitchArtists, plot_focus_switch
+from regrasp_lp.plotting.friction_cones import ConesArtists, plot_cones_at_one_point
+from regrasp_lp.plotting.graph import GraphArtists, plot_graph
 from regrasp_lp.plotting.grasps import GraspArtists, plot_grasp
+from regrasp_lp.plotting.normals import CandidateArtists, Window, plot_candidates
 from regrasp_lp.plotting.outline import PolygonArtists, plot_polygon
+from regrasp_lp.plotting.parallel_sets import (
+    CommonConeArtists,
+    UnionVolumeArtists,
+    plot_common_cone,
+    plot_union_volume,
+)
 
-__all__ = ["GraspArtists", "PolygonArtists", "plot_grasp", "plot_plan", "plot_polygon"]
+__all__ = [
+    "CandidateArtists",
+    "CommonConeArtists",
+    "ConesArtists",
+    "ContactSpaceArtists",
+    "FocusCellArtists",
+    "FocusSwitchArtists",
+    "GraphArtists",
+    "GraspArtists",
+    "PolygonArtists",
+    "ProjectionArtists",
+    "SubpolytopeArtists",
+    "UnionVolumeArtists",
+    "Window",
+    "plot_candidates",
+    "plot_common_cone",
+    "plot_cones_at_one_point",
+    "plot_contact_space",
+    "plot_focus_cell",
+    "plot_focus_switch",
+    "plot_graph",
+    "plot_grasp",
+    "plot_plan",
+    "plot_polygon",
+    "plot_projections",
+    "plot_subpolytopes",
+    "plot_union_volume",
+]
