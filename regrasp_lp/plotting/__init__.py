@@ -24,6 +24,7 @@ from regrasp_lp.plotting.contact_space import (
 from regrasp_lp.plotting.filmstrip import plot_plan
 from regrasp_lp.plotting.focus_cells import FocusCellArtists, plot_focus_cell
 from regrasp_lp.plotting.focus_switch import FocusSwitchArtists, plot_focus_switch
+from regrasp_lp.plotting.frame import Drawing
 from regrasp_lp.plotting.friction_cones import ConesArtists, plot_cones_at_one_point
 from regrasp_lp.plotting.graph import GraphArtists, plot_graph
 from regrasp_lp.plotting.grasps import GraspArtists, plot_grasp
@@ -41,6 +42,7 @@ __all__ = [
     "CommonConeArtists",
     "ConesArtists",
     "ContactSpaceArtists",
+    "Drawing",
     "FocusCellArtists",
     "FocusSwitchArtists",
     "GraphArtists",
