@@ -34,13 +34,15 @@ def pictures() -> dict[str, plotting.Drawing]:
     """Return the pictures by the names of their files."""
     gusset = model("machine_parts", "gusset")
     graph = rl.build_switching_graph(gusset, MU, sets="chapter", switching="focus")
-    star = rl.build_switching_graph(model("stars", "star_25"), MU, sets="chapter")
+    star = rl.build_switching_graph(
+        model("stars", "star_25"), MU, sets="chapter", switching="focus"
+    )
     concurrent = widest(graph, "concurrent")[0]
-    neighbor = next(i for i in widest(graph, "concurrent") if i in graph.neighbors(concurrent))
     sets = graph.sets
+    (leave,), (come,) = sets.on_edges((1, 5, 8)), sets.on_edges((5, 8, 13))
     return {
         "focus_cell": plotting.plot_focus_cell(sets[concurrent]),
-        "focus_switch": plotting.plot_focus_switch(graph, concurrent, neighbor),
+        "focus_switch": plotting.plot_focus_switch(graph, leave, come),
         "common_cone": plotting.plot_common_cone(sets[widest(graph, "parallel")[0]]),
         "candidates": plotting.plot_candidates(
             gusset, MU, "concurrent", sets[concurrent].edges[:2]

@@ -313,11 +313,6 @@ class Cones:
         return self.boundary.values
 
     @property
-    def ray_lengths(self) -> FloatArray:
-        """Length of each ray, shape (2 n,)."""
-        return self.boundary.lengths
-
-    @property
     def unit_rays(self) -> FloatArray:
         """The rays scaled to length 1, shape (2 n, 2)."""
         return self.boundary.units

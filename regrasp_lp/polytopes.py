@@ -6,6 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.spatial import ConvexHull, HalfspaceIntersection
 
+from regrasp_lp.errors import OptionError
 from regrasp_lp.linear_sets import FloatArray, LinearSets
 from regrasp_lp.lp import get_solver, maximise_margins
 
@@ -26,6 +27,11 @@ def corners(sets: LinearSets) -> list[FloatArray]:
     list of numpy.ndarray, shape (K, n)
         In the plane counter-clockwise. Empty where the set has no interior.
 
+    Raises
+    ------
+    OptionError
+        If a box is not bounded.
+
     Examples
     --------
     >>> half = LinearSets(("x", "y"), np.array([[[1.0, 1.0]]]), np.ones((1, 1)), np.ones((1, 1)),
@@ -35,6 +41,8 @@ def corners(sets: LinearSets) -> list[FloatArray]:
     """
     if not len(sets):
         return []
+    if not (np.isfinite(sets.lower).all() and np.isfinite(sets.upper).all()):
+        raise OptionError("corners are those of sets in a bounded box: join them with one")
     unit = sets.upper - sets.lower
     halfspaces = _in_unit_box(sets, unit)
     void = np.abs(halfspaces.rows).max(axis=2) == 0

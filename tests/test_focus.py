@@ -28,12 +28,12 @@ from regrasp_lp.friction import Cones
 from regrasp_lp.grasp_sets.candidates import concurrent_candidates, two_finger_candidates
 from regrasp_lp.grasp_sets.collection import GraspSet
 from regrasp_lp.grasp_sets.focus import (
-    cell_exists,
     cell_pieces,
     focus_cell,
     independent_regions,
     two_finger_sweeps,
 )
+from regrasp_lp.grasp_sets.sweeps import Sweeps
 from regrasp_lp.linear_sets import LinearSets
 from regrasp_lp.lp import get_solver, maximise_margins
 from regrasp_lp.polygon import Polygon
@@ -59,6 +59,13 @@ def spread_friction(n: int, seed: int, least: int = 1, most: int = 12) -> np.nda
 
 def candidates(cones: Cones, m: int) -> np.ndarray:
     return concurrent_candidates(cones) if m == 3 else two_finger_candidates(cones)
+
+
+def cell_exists(cones: Cones, edges: np.ndarray) -> np.ndarray:
+    """Whether the focus cells of candidates have an interior, exactly."""
+    of_pairs = edges.shape[1] == 2
+    sweeps = two_finger_sweeps(cones, edges) if of_pairs else Sweeps.of_cones(cones)
+    return sweeps.any_meet(cell_pieces(edges))
 
 
 # --- the theorem: a cell has an interior iff the set exists -------------------------------------

@@ -355,6 +355,15 @@ class TestCommonCone:
             assert np.ptp(line.get_xydata()[:, 0]) == pytest.approx(0)
             assert np.ptp(line.get_xydata()[:, 1]) > 0
 
+    def test_contacts_on_one_line(self):
+        """The segment meets the cone in the centre contact only; forces have a direction still."""
+        quadrilateral = rl.Polygon([(100, 103), (98, 101), (97, 99), (97, 98)])
+        graph = rl.build_switching_graph(quadrilateral, [1, 0.25, 0.25, 2], sets="chapter")
+        for grasp_set in graph.sets:
+            if grasp_set.kind == "parallel":
+                for line in plot_common_cone(grasp_set).forces.values():
+                    assert np.isfinite(line.get_xydata()).all()
+
     def test_refusals(self):
         (grasp_set,), (triangle,) = some("hex_nut", "parallel", 1), graph_of("wedge").sets
         for plot in (plot_common_cone, plot_union_volume, plot_cones_at_one_point):

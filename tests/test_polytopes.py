@@ -11,6 +11,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from scipy.spatial import ConvexHull
 
+from regrasp_lp.errors import OptionError
 from regrasp_lp.linear_sets import LinearSets
 from regrasp_lp.polytopes import corners
 
@@ -300,3 +301,10 @@ def test_many_lines_through_one_corner(shift: float) -> None:
             gaps = np.hypot(*(found - np.roll(found, 1, axis=0)).T)
             assert gaps.min() > 1e-9
             assert len(found) == 6
+
+
+def test_unbounded_sets_are_refused() -> None:
+    far = np.full((1, 2), np.inf)
+    half = LinearSets(("x", "y"), np.ones((1, 1, 2)), np.ones((1, 1)), np.ones((1, 1)), -far, far)
+    with pytest.raises(OptionError, match="bounded box"):
+        corners(half)

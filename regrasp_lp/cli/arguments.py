@@ -165,7 +165,6 @@ def read_command_line(parser: argparse.ArgumentParser, arguments: Sequence[str])
 
 def build_parser() -> argparse.ArgumentParser:
     """Return the parser of the whole command line."""
-    # so late that a help text does not wait for what only the commands need
     parser = _Parser(prog=PROGRAM, description=_OVERVIEW, epilog=_OVERVIEW_EXAMPLES)
     version = f"{PROGRAM} {regrasp_lp.__version__}"
     parser.add_argument("--version", action="version", version=version)
@@ -178,88 +177,10 @@ def build_parser() -> argparse.ArgumentParser:
         added.set_defaults(run=_late(name))
         return added
 
-    plan = command("plan", "plan from one grasp to another", _PLAN, _PLAN_EXAMPLES)
-    _add_object(plan, "needed if the file holds several")
-    _add_grasps(plan)
-    _add_model(plan)
-    plan.add_argument(
-        "--aligning",
-        choices=("slide", "regrip"),
-        default="slide",
-        help="how fingers move inside a grasp set: sliding along the edges (default), or by free "
-        "fingers taking over",
-    )
-    files = plan.add_argument_group("files to write")
-    _add_output(files, "--json", values.output_file, "the plan, for `check` and other programs")
-    _add_output(files, "--plot", values.picture_file, "a filmstrip of it: .png, .svg or .pdf")
-
-    graph = command("graph", "summarise all grasps and switches", _GRAPH, _GRAPH_EXAMPLES)
-    _add_object(graph, "all of them by default")
-    _add_switching(_add_model(graph), "contact")
-    graph.add_argument(
-        "--min-margin",
-        type=values.length,
-        default=0.0,
-        metavar="LENGTH",
-        help="drop grasp sets and switches whose best margin is not larger, in the object's unit "
-        "(default: 0)",
-    )
-    files = graph.add_argument_group("files to write")
-    _add_output(files, "--save", values.output_file, "the graph, for regrasp_lp.load_graph")
-
-    table = command("table", "tabulate the graphs of many polygons", _TABLE, _TABLE_EXAMPLES)
-    table.add_argument(
-        "paths",
-        nargs="+",
-        metavar="PATH",
-        help="polygons, as GeoJSON or as WKT, or a folder: all its files *.geojson and *.wkt, by "
-        "name",
-    )
-    _add_sets(table, "chapter")
-    _add_switching(table, None)
-    table.add_argument(
-        "--friction",
-        type=values.one_friction,
-        default=math.tan(math.radians(10)),
-        metavar="MU",
-        help="coefficient of friction of all edges (default: the tangent of 10°, about "
-        "0.1763; the chapter gives no angle for its tables, but their numbers fit about this one)",
-    )
-    table.add_argument(
-        "--max-edges",
-        type=values.edges,
-        default=math.inf,
-        metavar="N",
-        help="leave out polygons of more edges",
-    )
-    table.add_argument(
-        "--format",
-        choices=("text", "csv", "markdown"),
-        help="how the table is written (default: by the suffix of OUT, .csv or .md, else text)",
-    )
-    table.add_argument(
-        "-o",
-        "--output",
-        type=values.output_file,
-        metavar="OUT",
-        help="where to write the table (default: standard output)",
-    )
-
-    show = command("show", "draw an object with its edge numbers", _SHOW, _SHOW_EXAMPLES)
-    _add_object(show, "needed if the file holds several")
-    show.add_argument(
-        "-o",
-        "--plot",
-        type=values.picture_file,
-        metavar="OUT",
-        help="the picture to write: .png, .svg or .pdf (default: NAME.png in the current folder)",
-    )
-    show.add_argument(
-        "--list",
-        action="store_true",
-        help="print where each edge starts and ends, and its length; draw only with --plot",
-    )
-
+    _add_plan(command("plan", "plan from one grasp to another", _PLAN, _PLAN_EXAMPLES))
+    _add_graph(command("graph", "summarise all grasps and switches", _GRAPH, _GRAPH_EXAMPLES))
+    _add_table(command("table", "tabulate the graphs of many polygons", _TABLE, _TABLE_EXAMPLES))
+    _add_show(command("show", "draw an object with its edge numbers", _SHOW, _SHOW_EXAMPLES))
     check = command("check", "verify a plan file exactly", _CHECK, _CHECK_EXAMPLES)
     check.add_argument("file", metavar="PLAN.json", help="the plan file")
     return parser
@@ -267,12 +188,99 @@ def build_parser() -> argparse.ArgumentParser:
 
 def _late(name: str) -> Callable[[argparse.Namespace], int]:
     def run(options: argparse.Namespace) -> int:
+        # so late that a help text does not wait for what only the commands need
         from regrasp_lp.cli import commands
 
         code: int = getattr(commands, name)(options)
         return code
 
     return run
+
+
+def _add_plan(parser: argparse.ArgumentParser) -> None:
+    _add_object(parser, "needed if the file holds several")
+    _add_grasps(parser)
+    _add_model(parser)
+    parser.add_argument(
+        "--aligning",
+        choices=("slide", "regrip"),
+        default="slide",
+        help="how fingers move inside a grasp set: sliding along the edges (default), or by free "
+        "fingers taking over",
+    )
+    files = parser.add_argument_group("files to write")
+    _add_output(files, "--json", values.output_file, "the plan, for `check` and other programs")
+    _add_output(files, "--plot", values.picture_file, "a filmstrip of it: .png, .svg or .pdf")
+
+
+def _add_graph(parser: argparse.ArgumentParser) -> None:
+    _add_object(parser, "all of them by default")
+    _add_switching(_add_model(parser), "contact")
+    parser.add_argument(
+        "--min-margin",
+        type=values.length,
+        default=0.0,
+        metavar="LENGTH",
+        help="drop grasp sets and switches whose best margin is not larger, in the object's unit "
+        "(default: 0)",
+    )
+    files = parser.add_argument_group("files to write")
+    _add_output(files, "--save", values.output_file, "the graph, for regrasp_lp.load_graph")
+
+
+def _add_table(parser: argparse.ArgumentParser) -> None:
+    parser.add_argument(
+        "paths",
+        nargs="+",
+        metavar="PATH",
+        help="polygons, as GeoJSON or as WKT, or a folder: all its files *.geojson and *.wkt, by "
+        "name",
+    )
+    _add_sets(parser, "chapter")
+    _add_switching(parser, None)
+    parser.add_argument(
+        "--friction",
+        type=values.one_friction,
+        default=math.tan(math.radians(10)),
+        metavar="MU",
+        help="coefficient of friction of all edges (default: the tangent of 10°, about "
+        "0.1763; the chapter gives no angle for its tables, but their numbers fit about this one)",
+    )
+    parser.add_argument(
+        "--max-edges",
+        type=values.edges,
+        default=math.inf,
+        metavar="N",
+        help="leave out polygons of more edges",
+    )
+    parser.add_argument(
+        "--format",
+        choices=("text", "csv", "markdown"),
+        help="how the table is written (default: by the suffix of OUT, .csv or .md, else text)",
+    )
+    parser.add_argument(
+        "-o",
+        "--output",
+        type=values.output_file,
+        metavar="OUT",
+        help="where to write the table (default: standard output)",
+    )
+
+
+def _add_show(parser: argparse.ArgumentParser) -> None:
+    _add_object(parser, "needed if the file holds several")
+    parser.add_argument(
+        "-o",
+        "--plot",
+        type=values.picture_file,
+        metavar="OUT",
+        help="the picture to write: .png, .svg or .pdf (default: NAME.png in the current folder)",
+    )
+    parser.add_argument(
+        "--list",
+        action="store_true",
+        help="print where each edge starts and ends, and its length; draw only with --plot",
+    )
 
 
 def _add_object(parser: argparse.ArgumentParser, which: str) -> None:

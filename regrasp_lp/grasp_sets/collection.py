@@ -14,14 +14,12 @@ from numpy.typing import ArrayLike
 from regrasp_lp.contact import Contact, Grasp
 from regrasp_lp.errors import OptionError
 from regrasp_lp.friction import FloatArray, IntArray
-from regrasp_lp.grasp_sets.double_cones import contact_pieces, sided_pieces
-from regrasp_lp.grasp_sets.focus import cell_pieces, focus_cell, independent_regions
+from regrasp_lp.grasp_sets.double_cones import double_cones
+from regrasp_lp.grasp_sets.focus import focus_cell, independent_regions
 from regrasp_lp.grasp_sets.parallel import common_cone_rays, outer_regions, subpolytopes
 from regrasp_lp.grasp_sets.pieces import in_positions, piece_sets
-from regrasp_lp.grasp_sets.sweeps import Sweeps
 from regrasp_lp.grasp_sets.vertices import Family
 from regrasp_lp.linear_sets import LinearSets
-from regrasp_lp.lp import get_solver, maximise_margins
 from regrasp_lp.margins import existing_pieces
 from regrasp_lp.polygon import Polygon
 from regrasp_lp.torque import TorqueFunctions
@@ -97,12 +95,8 @@ class GraspSet:
         """
         if self.kind != "concurrent":
             return None
-        cones, edges = self.torque.cones, np.array([self.edges])
-        names, lengths = self.names, self.torque.lengths[0]
-        widths = maximise_margins(contact_pieces(cones, edges, names), get_solver("highs")).margins
-        order = np.argsort(-widths, kind="stable")
-        order = order[Sweeps.of_cones(cones).meet(cell_pieces(edges)[0])[order]]
-        return in_positions(sided_pieces(cones, edges, names).take(order), [*lengths, 1.0, 1.0])
+        sets = double_cones(self.torque.cones, np.array(self.edges), self.names)
+        return in_positions(sets, [*self.torque.lengths[0], 1.0, 1.0])
 
     @cached_property
     def common_cone(self) -> FloatArray | None:
@@ -141,7 +135,8 @@ class GraspSet:
         if self.center is None:
             raise OptionError(f"outer regions are those of a parallel set; this one is {self.kind}")
         length = float(self.torque.cones.lengths[self.center])
-        if position is not None and not 0 <= position <= length:
+        number = position is None or isinstance(position, (int, float, np.number))
+        if not number or (position is not None and not 0 <= position <= length):
             raise OptionError(
                 f"position {position!r} is not on the centre edge {self.center}, from 0 to "
                 f"{length:g}"

@@ -21,6 +21,7 @@ from regrasp_lp.friction import Cones, FloatArray, IntArray
 from regrasp_lp.grasp_sets.focus import cell_pieces, in_object
 from regrasp_lp.grasp_sets.sweeps import Sweeps, sides_of
 from regrasp_lp.linear_sets import LinearSets
+from regrasp_lp.lp import get_solver, maximise_margins
 
 
 def sided_pieces(cones: Cones, edges: IntArray, names: Sequence[str]) -> LinearSets:
@@ -61,6 +62,27 @@ def sided_pieces(cones: Cones, edges: IntArray, names: Sequence[str]) -> LinearS
     return in_object(cones, sets)
 
 
+def double_cones(cones: Cones, edges: IntArray, names: Sequence[str]) -> LinearSets:
+    """Return the pieces of one concurrent set by `sided_pieces` that exist, the widest first.
+
+    Parameters
+    ----------
+    cones : Cones
+    edges : numpy.ndarray of int, shape (3,)
+    names : sequence of str
+
+    Returns
+    -------
+    LinearSets
+        Over the fractions `names`, "x" and "y".
+    """
+    edges = edges[None]
+    widths = maximise_margins(contact_pieces(cones, edges, names), get_solver("highs")).margins
+    order = np.argsort(-widths, kind="stable")
+    exist = Sweeps.of_cones(cones).meet(cell_pieces(edges)[0])
+    return sided_pieces(cones, edges, names).take(order[exist[order]])
+
+
 def contact_pieces(cones: Cones, edges: IntArray, names: Sequence[str]) -> LinearSets:
     """Return the same pieces with the focus point eliminated.
 
@@ -85,12 +107,14 @@ def contact_pieces(cones: Cones, edges: IntArray, names: Sequence[str]) -> Linea
     _, at, along = _moments(cones, edges, slot, ray, sign)
     everyone = np.arange(len(ray))[:, None, None]
     weight = circuit_weights(cones, np.where(member >= 0, ray[everyone, member], -1))
+    used = member[:, :, 0] >= 0
+    weight = weight / np.where(used, weight.sum(axis=2), 1.0)[..., None]
     rows = np.zeros((*member.shape[:2], 3))
     for i in range(3):
         rows[:, :, i] = (weight * np.where(slot[member] == i, along[everyone, member], 0)).sum(2)
     bounds = -(weight * at[everyone, member]).sum(axis=2)
     box = np.zeros((len(ray), 3)), np.ones((len(ray), 3))
-    return LinearSets(tuple(names), rows, weight.sum(axis=2), bounds, *box)
+    return LinearSets(tuple(names), rows, used.astype(np.float64), bounds, *box)
 
 
 def _signed_rays(edges: IntArray) -> tuple[IntArray, IntArray, IntArray]:

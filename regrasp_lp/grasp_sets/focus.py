@@ -16,7 +16,7 @@ import numpy as np
 
 from regrasp_lp.circuits import cross
 from regrasp_lp.errors import OptionError
-from regrasp_lp.friction import BoolArray, Cones, FloatArray, IntArray
+from regrasp_lp.friction import Cones, FloatArray, IntArray
 from regrasp_lp.grasp_sets.candidates import common_cone
 from regrasp_lp.grasp_sets.sweeps import Sweeps, sides_of
 from regrasp_lp.linear_sets import LinearSets
@@ -57,22 +57,6 @@ def cell_pieces(edges: IntArray) -> IntArray:
     if edges.shape[1] == 3:
         return np.asarray(2 * edges[:, None, :] + sides_of(3))
     return np.asarray(4 * np.arange(len(edges))[:, None, None] + np.array([[0, 2], [1, 3]]))
-
-
-def cell_exists(cones: Cones, edges: IntArray) -> BoolArray:
-    """Whether focus cells have an interior, exactly.
-
-    Parameters
-    ----------
-    cones : Cones
-    edges : numpy.ndarray of int, shape (N, m)
-        Candidates of concurrent (m = 3) or two-finger sets (m = 2).
-
-    Returns
-    -------
-    numpy.ndarray of bool, shape (N,)
-    """
-    return _sweeps(cones, edges).any_meet(cell_pieces(edges))
 
 
 def focus_cell(cones: Cones, edges: IntArray) -> LinearSets:

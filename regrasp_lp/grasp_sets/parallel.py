@@ -73,8 +73,8 @@ def outer_regions(cones: Cones, center: int, others: Sequence[int], span: FloatA
     right, left = common_cone_rays(cones, center, others)
     ends = cones.starts[center] + np.outer(span, cones.vectors[center])
     rows, bounds = np.empty((2, 4, 2)), np.empty((2, 4))
-    for k, side in enumerate((1.0, -1.0)):  # to the left of a line along d: d × (x - p) > 0
-        normals = side * np.array([[d[1], -d[0]] for d in (right, left)])
+    for k, side in enumerate((_LEFT, _RIGHT)):  # to the left of a line along d: d × (x - p) > 0
+        normals = -side * np.array([[d[1], -d[0]] for d in (right, left)])
         rows[k] = normals.repeat(2, axis=0)
         bounds[k] = (normals @ ends.T).ravel()
     everywhere = np.full((2, 2), np.inf)

@@ -28,7 +28,7 @@ _FLATTEST = 0.55  # least ratio of two sides of a box in space, on the paper
 _STEPS = (1, 2, 2.5, 5, 10)  # of ticks
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(frozen=True, eq=False, repr=False)
 class SubpolytopeArtists(Drawing):
     """What `plot_subpolytopes` drew.
 
@@ -43,7 +43,7 @@ class SubpolytopeArtists(Drawing):
     box: Line3DCollection
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(frozen=True, eq=False, repr=False)
 class ContactSpaceArtists(Drawing):
     """What `plot_contact_space` drew; in space or, for two contacts, in the plane.
 
@@ -62,7 +62,7 @@ class ContactSpaceArtists(Drawing):
     between: Poly3DCollection | PathPatch
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(frozen=True, eq=False, repr=False)
 class ProjectionArtists(Drawing):
     """What `plot_projections` drew; None is what is empty.
 
@@ -79,7 +79,9 @@ class ProjectionArtists(Drawing):
     common: PathPatch | None
 
 
-def plot_subpolytopes(grasp_set: GraspSet, ax: Axes3D | None = None) -> SubpolytopeArtists:
+def plot_subpolytopes(
+    grasp_set: GraspSet, ax: Axes3D | None = None, *, key: bool = True
+) -> SubpolytopeArtists:
     """Draw the six convex sub-polytopes of a parallel set in contact space (Fig. 3.8a).
 
     K0 and K1 have the contacts that are not on the centre edge in different outer regions; in K2
@@ -92,6 +94,8 @@ def plot_subpolytopes(grasp_set: GraspSet, ax: Axes3D | None = None) -> Subpolyt
         A parallel set.
     ax : mpl_toolkits.mplot3d.axes3d.Axes3D, optional
         By default new axes of a new figure.
+    key : bool, optional
+        Whether to say what the colours mean.
 
     Returns
     -------
@@ -119,11 +123,14 @@ def plot_subpolytopes(grasp_set: GraspSet, ax: Axes3D | None = None) -> Subpolyt
             keys.append(_key(color, f"K{k}", 0.35))
         else:
             keys.append(Patch(facecolor="none", edgecolor=palette.GREY, label=f"K{k}: empty"))
-    _write_key(ax, keys, 3)
+    if key:
+        _write_key(ax, keys, 3)
     return SubpolytopeArtists(ax, MappingProxyType(drawn), box)
 
 
-def plot_contact_space(grasp_set: GraspSet, ax: Axes | None = None) -> ContactSpaceArtists:
+def plot_contact_space(
+    grasp_set: GraspSet, ax: Axes | None = None, *, key: bool = True
+) -> ContactSpaceArtists:
     """Draw a grasp set in contact space, between the two convex bodies that bound it.
 
     Every torque function grows with every position. Where none is positive, at the near corner,
@@ -137,6 +144,8 @@ def plot_contact_space(grasp_set: GraspSet, ax: Axes | None = None) -> ContactSp
         Of any kind: two fingers are drawn in the plane, three in space.
     ax : matplotlib.axes.Axes, optional
         For three fingers an ``Axes3D``. By default new axes of a new figure.
+    key : bool, optional
+        Whether to say what the colours mean.
 
     Returns
     -------
@@ -171,12 +180,18 @@ def plot_contact_space(grasp_set: GraspSet, ax: Axes | None = None) -> ContactSp
             for points, color in zip(bodies, colors, strict=True)
         ]
         drawn.append(_draw_faces(ax, sides(grasp_set), palette.SET, 0.25))
-    _write_key(ax, [key for key, artist in zip(keys, drawn, strict=True) if artist], 1)
+    if key:
+        _write_key(ax, [sign for sign, artist in zip(keys, drawn, strict=True) if artist], 1)
     return ContactSpaceArtists(ax, *drawn)
 
 
 def plot_projections(
-    first: GraspSet, second: GraspSet, on: int | Sequence[int], ax: Axes | None = None
+    first: GraspSet,
+    second: GraspSet,
+    on: int | Sequence[int],
+    ax: Axes | None = None,
+    *,
+    key: bool = True,
 ) -> ProjectionArtists:
     """Draw where the contacts that two sets hold in common can be (Figs. 3.8c, 3.8d and 3.9b).
 
@@ -194,6 +209,8 @@ def plot_projections(
         the other; where it has two contacts of a set, either may be the held one.
     ax : matplotlib.axes.Axes, optional
         By default new axes of a new figure.
+    key : bool, optional
+        Whether to say what the colours mean.
 
     Returns
     -------
@@ -206,7 +223,7 @@ def plot_projections(
         If a set has no contacts on these edges, their number is not 1 or 2, the sets are not of
         one object, or the axes have depth.
     """
-    held = [on] if isinstance(on, int) else list(on)
+    held = np.atleast_1d(on).tolist()
     if len(held) not in (1, 2):
         raise OptionError(f"projections are drawn on 1 or 2 held edges, got {len(held)}: {held}")
     if first.polygon != second.polygon:
@@ -231,7 +248,8 @@ def plot_projections(
         _key(color, text, alpha, hatch)
         for (color, alpha, hatch), text in zip(looks, texts, strict=True)
     ]
-    _write_key(ax, keys, 1)
+    if key:
+        _write_key(ax, keys, 1)
     return ProjectionArtists(ax, *drawn)
 
 

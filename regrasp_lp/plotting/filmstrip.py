@@ -21,7 +21,7 @@ from regrasp_lp.errors import OptionError
 from regrasp_lp.planning.steps import Place, Release, Slide
 from regrasp_lp.plotting import palette
 from regrasp_lp.plotting.frame import POINTS_PER_INCH, OwnFigure
-from regrasp_lp.plotting.grasps import GraspArtists, plot_grasp
+from regrasp_lp.plotting.grasps import COMMON_CONE, GraspArtists, plot_grasp
 
 if TYPE_CHECKING:
     from regrasp_lp.planning.plan import Plan
@@ -33,6 +33,7 @@ _BORDER, _GUTTER = 0.12, 0.16
 _TITLE = 0.40  # two lines over each panel
 _HEAD, _KEY_LINE = 0.44, 0.20
 _KEY_ENTRY = 1.75  # width of an entry of the key
+_COMMON_CONE = {name: COMMON_CONE[name] for name in ("facecolor", "edgecolor")}
 
 
 @dataclass(frozen=True)
@@ -268,6 +269,7 @@ def _key(plan: Plan) -> list[Line2D | Patch]:
         set(grasp.contacts) - set(grasp.support.fingers) - set(_moved(plan, grasp.after_step))
         for grasp in plan.grasps
     )
+    centers = [g.support.center for g in plan.grasps if len(g.support.fingers) > 2]
     fill = (palette.SKY, 0.3)
     line: dict[str, Any] = {"color": palette.GREEN, "linestyle": palette.DASHES}
     signs: list[tuple[bool, Line2D | Patch]] = [
@@ -275,7 +277,8 @@ def _key(plan: Plan) -> list[Line2D | Patch]:
         (only_touching, _circle("white", palette.BLUE, "only touches")),
         (bool(actions & {Place, Slide}), _circle(palette.VERMILLION, palette.INK, "just moved")),
         (Release in actions, _circle("white", palette.GREY, "just released")),
-        (sizes != {2}, Patch(facecolor=fill, edgecolor=palette.SKY, label="friction cone")),
+        (None in centers, Patch(facecolor=fill, edgecolor=palette.SKY, label="friction cone")),
+        (any(c is not None for c in centers), Patch(label="common cone", **_COMMON_CONE)),
         (2 in sizes, Line2D([], [], linewidth=1.4, label="two-finger grasp", **line)),
     ]
     return [sign for occurs, sign in signs if occurs]

@@ -19,12 +19,13 @@ from numpy.typing import ArrayLike
 from regrasp_lp.errors import OptionError
 from regrasp_lp.friction import FloatArray
 from regrasp_lp.grasp_sets.collection import GraspSet
-from regrasp_lp.grasp_sets.focus import in_object, two_finger_sweeps
+from regrasp_lp.grasp_sets.focus import two_finger_sweeps
 from regrasp_lp.grasp_sets.parallel import common_cone_rays
 from regrasp_lp.linear_sets import LinearSets
 from regrasp_lp.lp import get_solver, maximise_margins
 from regrasp_lp.plotting import palette
 from regrasp_lp.plotting.frame import Drawing
+from regrasp_lp.plotting.grasps import pie
 from regrasp_lp.plotting.scene import (
     CONE,
     DOT,
@@ -38,8 +39,8 @@ from regrasp_lp.plotting.scene import (
     draw_regions,
     draw_sets,
     grown,
-    pie,
     set_scene,
+    swept,
     within,
 )
 from regrasp_lp.polygon import Polygon
@@ -63,7 +64,7 @@ _LITERAL: dict[str, Any] = {
 FOCUS: dict[str, Any] = {"markerfacecolor": "white", "marker": "D", "markersize": 5.5}
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(frozen=True, eq=False, repr=False)
 class FocusCellArtists(Drawing):
     """What `plot_focus_cell` drew.
 
@@ -141,10 +142,11 @@ def plot_focus_cell(
     cell, polygon = cell_of(grasp_set), grasp_set.polygon
     if literal and len(grasp_set.edges) != 2:
         raise OptionError(f"literal=True is for two-finger sets; this one is {grasp_set.kind}")
-    at = focus_point(polygon, cell) if point is None else np.asarray(point, dtype=np.float64)
-    if at is None:
+    point = focus_point(polygon, cell) if point is None else point
+    if point is None:
         raise OptionError(f"the focus cell of edges {grasp_set.edges} is too thin to be drawn")
-    regions = dict(zip(grasp_set.edges, grasp_set.independent_regions(at), strict=True))
+    regions = dict(zip(grasp_set.edges, grasp_set.independent_regions(point), strict=True))
+    at = np.asarray(point, dtype=np.float64)
     cones = cones_at(polygon, rays_of(grasp_set), at, regions)
     view = around(polygon.bounds, near_object(polygon, cell), *rims(cones))
     view = grown(view, _BESIDE * polygon.diameter) if literal else view
@@ -216,9 +218,7 @@ def _draw_literal(scene: Scene, grasp_set: GraspSet) -> PathPatch:
     """Draw where the two edges' regions of one and the same side meet, which may be unbounded."""
     cones = grasp_set.torque.cones
     sweeps = two_finger_sweeps(cones, np.array([grasp_set.edges]))
-    sets = in_object(cones, sweeps.linear_sets(np.array([[0, 3], [1, 2]])))
-    everywhere = np.full_like(sets.lower, np.inf)
-    return draw_sets(scene, replace(sets, lower=-everywhere, upper=everywhere), **_LITERAL)
+    return draw_sets(scene, swept(sweeps, np.array([[0, 3], [1, 2]])), **_LITERAL)
 
 
 def rays_of(grasp_set: GraspSet) -> dict[int, FloatArray]:
@@ -243,7 +243,7 @@ def cones_at(
         ends = polygon.points(edge, region / polygon.edge_lengths[edge])
         side = np.sign((point - polygon.edge_starts[edge]) @ polygon.normals[edge])
         radius = float(np.hypot(*(ends - point).T).max()) + _PAST * polygon.diameter
-        cones[edge] = pie(point, -side * rays[edge], radius)
+        cones[edge] = pie(point, -side * rays[edge], radius, **CONE)
     return cones
 
 

@@ -60,7 +60,7 @@ _LEAVING: dict[str, Any] = {"markerfacecolor": "white", "markeredgecolor": palet
 _COMING: dict[str, Any] = {"markerfacecolor": palette.VERMILLION, "marker": "s"}
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(frozen=True, eq=False, repr=False)
 class FocusSwitchArtists(Drawing):
     """What `plot_focus_switch` drew.
 
@@ -119,7 +119,8 @@ def plot_focus_switch(
     Raises
     ------
     OptionError
-        If a set has no focus cell, they have too few edges in common, or the cells do not meet.
+        If a set has no focus cell, they have too few edges in common, or the cells do not meet (or
+        too little to be drawn).
     IndexError
         If there is no such set.
     """
@@ -129,7 +130,9 @@ def plot_focus_switch(
     polygon, both = graph.polygon, meeting(*cells)
     at = focus_point(polygon, both)
     if at is None:
-        raise OptionError(f"the focus cells of sets {first} and {second} do not meet")
+        raise OptionError(
+            f"the focus cells of sets {first} and {second} do not meet, or too little to be drawn"
+        )
     # of a two-finger set the cone, and so the region on a common edge, is within the other
     narrow_last = sorted(sets, key=lambda s: -len(s.edges))
     regions = {

@@ -31,7 +31,7 @@ class OwnFigure(Figure):
         return data.getvalue()
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(frozen=True, eq=False, repr=False)
 class Drawing:
     """What a plot function drew on one axes.
 
@@ -47,6 +47,9 @@ class Drawing:
     def figure(self) -> Any:
         """The figure of the axes."""
         return self.ax.figure
+
+    def __repr__(self) -> str:
+        return f"<{type(self).__name__} on {self.ax!r}>"
 
     def _repr_png_(self) -> bytes | None:
         # an axes that was given belongs to a figure that its owner shows

@@ -15,15 +15,16 @@ from matplotlib.text import Text
 from regrasp_lp.grasp_sets.collection import GraspSet
 from regrasp_lp.plotting import palette
 from regrasp_lp.plotting.frame import Drawing, fit, own_axes
+from regrasp_lp.plotting.grasps import pie
 from regrasp_lp.plotting.parallel_sets import common_cone_of, draw_double_cone
-from regrasp_lp.plotting.scene import around, pie
+from regrasp_lp.plotting.scene import CONE, around
 
 _INVERTED: dict[str, Any] = {"linestyle": palette.DASHES, "edgecolor": palette.INK}
 _RADII = (1.0, 1.35, 1.7)  # of the cones at one point
 _OUTLINE: dict[str, Any] = {"facecolor": "none", "edgecolor": palette.INK, "linewidth": 1.1}
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(frozen=True, eq=False, repr=False)
 class ConesArtists(Drawing):
     """What `plot_cones_at_one_point` drew.
 
@@ -73,7 +74,7 @@ def plot_cones_at_one_point(grasp_set: GraspSet, ax: Axes | None = None) -> Cone
     for edge, radius in zip(inverted_last, _RADII, strict=True):
         sign, style = (-1, _INVERTED) if edge == center else (1, {})
         rays = sign * unit_rays[[2 * edge, 2 * edge + 1]]
-        cones[edge] = pie(origin, rays, radius, **{**_OUTLINE, **style})
+        cones[edge] = pie(origin, rays, radius, **{**CONE, **_OUTLINE, **style})
     shown = around(*(cone.get_xy() for cone in cones.values()), -common)
     if ax is None:
         ax = own_axes(shown, 4.5)
@@ -88,7 +89,8 @@ def plot_cones_at_one_point(grasp_set: GraspSet, ax: Axes | None = None) -> Cone
 
 def _name_cone(ax: Axes, edge: int, cone: Wedge, *, inverted: bool) -> Text:
     """Write the name of a cone in the middle of its rim."""
-    x, y = cone.get_xy()[17]
+    rim = cone.get_xy()[1:-1]  # from the apex to the apex
+    x, y = rim[len(rim) // 2]
     return ax.text(
         x,
         y,

@@ -33,7 +33,7 @@ _BETWEEN = 0.035  # room over a row of squares for their sizes, in widths of all
 _NAMED_FROM = 0.08  # squares from this part of the width on have their size written over them
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(frozen=True, eq=False, repr=False)
 class GraphArtists(Drawing):
     """What `plot_graph` drew.
 
@@ -59,7 +59,7 @@ class GraphArtists(Drawing):
 
 
 def plot_graph(
-    graph: SwitchingGraph, ax: Axes | None = None, *, color: str = "kind"
+    graph: SwitchingGraph, ax: Axes | None = None, *, color: str = "kind", key: bool = True
 ) -> GraphArtists:
     """Draw a switching graph.
 
@@ -79,6 +79,8 @@ def plot_graph(
         By default new axes of a new figure, larger for more sets.
     color : {"kind", "component"}, optional
         What the colour of a mark tells; components beyond the sixth are grey.
+    key : bool, optional
+        Whether to say what marks mean, and how many sets and switches there are.
 
     Returns
     -------
@@ -106,7 +108,8 @@ def plot_graph(
     vertices = _draw_sets(ax, graph, positions, colors, squares)
     sizes = _write_sizes(ax, components, squares)
     left_out = graph.n_switches - len(shown)
-    _write_key(ax, graph, components, color, left_out)
+    if key:
+        _write_key(ax, graph, components, color, left_out)
     return GraphArtists(
         ax, positions, MappingProxyType(vertices), lines, len(shown), left_out, sizes
     )
@@ -337,18 +340,8 @@ def _write_key(
     title = ", ".join(_counted(count, word) for word, count in counts.items())
     if left_out:
         title += f"\n({_counted(left_out, 'switch')} not drawn)"
-    ax.legend(
-        handles=keys,
-        title=title,
-        title_fontsize=9,
-        alignment="left",
-        fontsize=8,
-        ncols=3,
-        frameon=False,
-        loc="lower left",
-        bbox_to_anchor=(0.0, 1.0),
-        borderaxespad=0.2,
-    )
+    place: dict[str, Any] = {"bbox_to_anchor": (0.0, 1.0), "borderaxespad": 0.2}
+    ax.legend(handles=keys, title=title, ncols=3, **palette.KEY_OVER_AXES, **place)
 
 
 def _counted(count: int, word: str) -> str:

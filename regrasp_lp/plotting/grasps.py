@@ -15,9 +15,11 @@ from matplotlib.patches import FancyArrowPatch
 from matplotlib.patches import Polygon as Wedge
 from matplotlib.text import Text
 
+from regrasp_lp.circuits import cross
 from regrasp_lp.contact import Contact, Grasp
 from regrasp_lp.errors import OptionError
-from regrasp_lp.friction import FloatArray, per_edge_friction
+from regrasp_lp.friction import Cones, FloatArray
+from regrasp_lp.grasp_sets.candidates import common_cone
 from regrasp_lp.plotting import palette
 from regrasp_lp.plotting.frame import Drawing, Frame, shifted
 from regrasp_lp.plotting.outline import PolygonArtists, number_edges, paper_of, plot_polygon
@@ -30,6 +32,23 @@ _ARROW_SHIFT = 4.5  # points from an edge to the arrow of a slide along it
 _ARROW_LEAST = 11.0  # length of the shortest arrow, in points
 _TURNS = (0, 20, -20, 40, -40, 60, -60, 80, -80, 110, -110, 145, -145)
 _SEARCH = Search(palette.FINGER_GAP, (0, 5, 11, 18, 27, 38), _TURNS, sweeps=3)
+FORCE: dict[str, Any] = {
+    "color": palette.GREEN,
+    "linestyle": palette.DASHES,
+    "linewidth": 1.4,
+    "zorder": palette.LINE_LAYER,
+}
+_CONE: dict[str, Any] = {
+    "facecolor": (palette.SKY, 0.22),
+    "edgecolor": (palette.SKY, 0.9),
+    "linewidth": 0.6,
+    "zorder": palette.CONE_LAYER,
+}
+COMMON_CONE: dict[str, Any] = {
+    **_CONE,
+    "facecolor": (palette.PURPLE, 0.35),
+    "edgecolor": (palette.PURPLE, 1.0),
+}
 
 
 @dataclass(frozen=True, eq=False)
@@ -54,7 +73,7 @@ class FingerArtists:
     number: Text
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(frozen=True, eq=False, repr=False)
 class GraspArtists(Drawing):
     """What `plot_grasp` drew.
 
@@ -99,7 +118,8 @@ def plot_grasp(
     A finger is a numbered circle beside the object, joined to a dot at its contact: blue if it
     supports the object, white if it only touches, vermillion with a dark ring if highlighted, grey
     and hollow if just released. Three or more supporting fingers are drawn with their friction
-    cones, as far as these lie in the object; two are joined by a dashed line.
+    cones, as far as these lie in the object, or with their common cone, in another colour; two are
+    joined by a dashed line.
 
     Parameters
     ----------
@@ -145,7 +165,7 @@ def plot_grasp(
     >>> sorted(artists.fingers), artists.line is not None
     ([1, 2], True)
     """
-    mu = per_edge_friction(friction, polygon.n_edges)
+    friction_cones = Cones.of(polygon, friction)
     now, gone = _resolved(polygon, contacts), _resolved(polygon, released or {})
     before = _resolved(polygon, slid_from or {})
     holding = tuple(now) if support is None else tuple(sorted(support))
@@ -153,7 +173,8 @@ def plot_grasp(
         _check_touching(what, named, now)
     drawn = plot_polygon(polygon, ax, edge_numbers=False)
     frame = Frame.of(drawn.ax)
-    wedges, line = _draw_support(drawn, polygon, mu, {k: now[k] for k in holding if cones}, center)
+    supporting = {k: now[k] for k in holding if cones}
+    wedges, line = _draw_support(drawn, polygon, friction_cones, supporting, center)
     moves = ((k, _draw_arrow(drawn.ax, polygon, frame, before[k], now[k])) for k in before)
     arrows = {k: arrow for k, arrow in moves if arrow is not None}
     avoid = [_at(polygon, c) for c in (*now.values(), *gone.values(), *before.values())]
@@ -199,73 +220,71 @@ def _at(polygon: Polygon, contact: Contact) -> FloatArray:
 # --- what holds the object ----------------------------------------------------------------------
 
 
-def _cone_angles(
-    polygon: Polygon, mu: FloatArray, holding: Mapping[int, Contact], center: int | None
-) -> dict[int, tuple[float, float]]:
-    """First and last direction of each finger's cone, in radians."""
-    direction = np.arctan2(polygon.normals[:, 1], polygon.normals[:, 0])
-    half = np.arctan(mu)
-    whole = {
-        k: (float(direction[c.edge] - half[c.edge]), float(direction[c.edge] + half[c.edge]))
-        for k, c in holding.items()
-    }
-    opposite = {k: np.pi if c.edge == center else 0.0 for k, c in holding.items()}
-    if center is None or not any(opposite.values()):
-        return whole
-    # all cones as seen from the contacts that are not on the centre edge, near one direction
-    reference = next(float(direction[c.edge]) for k, c in holding.items() if not opposite[k])
-    low, high = -np.inf, np.inf
-    for k, (first, last) in whole.items():
-        middle = (first + last) / 2 + opposite[k] - reference
-        apart = (middle + np.pi) % (2 * np.pi) - np.pi
-        low, high = max(low, apart - (last - first) / 2), min(high, apart + (last - first) / 2)
-    if low >= high:
-        return whole
-    return {k: (reference + low + turn, reference + high + turn) for k, turn in opposite.items()}
+def _cone_rays(
+    cones: Cones, holding: Mapping[int, Contact], center: int | None
+) -> tuple[dict[int, FloatArray], dict[str, Any]]:
+    """Clockwise and counter-clockwise boundary of each finger's cone, and how it looks."""
+    edges = {k: c.edge for k, c in holding.items()}
+    others = [edge for edge in edges.values() if edge != center]
+    if len(edges) == 3 and len(others) == 2:
+        common = common_cone(cones, np.array([[center, *others]]))
+        if common.exists[0]:
+            rays = cones.unit_rays[common.ray[0]] * common.sign[0][:, None]
+            of_edges = {k: -rays if edge == center else rays for k, edge in edges.items()}
+            return of_edges, COMMON_CONE
+    return {k: cones.unit_rays[[2 * edge, 2 * edge + 1]] for k, edge in edges.items()}, _CONE
 
 
 def _draw_support(
     drawn: PolygonArtists,
     polygon: Polygon,
-    mu: FloatArray,
+    cones: Cones,
     holding: Mapping[int, Contact],
     center: int | None,
 ) -> tuple[dict[int, Wedge], Line2D | None]:
     """Draw the line of two fingers, or the cones of any other number of them."""
     if len(holding) == 2:
-        return {}, _draw_line(drawn.ax, np.stack([_at(polygon, c) for c in holding.values()]))
-    angles = _cone_angles(polygon, mu, holding, center)
-    return {k: _draw_cone(drawn, polygon, c, *angles[k]) for k, c in holding.items()}, None
+        ends = np.stack([_at(polygon, contact) for contact in holding.values()])
+        return {}, draw_line(drawn.ax, ends, **FORCE)
+    rays, style = _cone_rays(cones, holding, center)
+    return {k: _draw_cone(drawn, polygon, c, rays[k], style) for k, c in holding.items()}, None
 
 
 def _draw_cone(
-    drawn: PolygonArtists, polygon: Polygon, contact: Contact, first: float, last: float
+    drawn: PolygonArtists,
+    polygon: Polygon,
+    contact: Contact,
+    rays: FloatArray,
+    style: dict[str, Any],
 ) -> Wedge:
     """Draw a cone as a pie as large as the object, clipped to it."""
-    apex, angles = _at(polygon, contact), np.linspace(first, last, 33)
-    rim = apex + polygon.diameter * np.stack([np.cos(angles), np.sin(angles)], axis=1)
-    color = palette.SKY
-    wedge = Wedge(
-        np.vstack([apex, rim]),
-        closed=True,
-        zorder=palette.CONE_LAYER,
-        linewidth=0.6,
-        facecolor=(color, 0.22),
-        edgecolor=(color, 0.9),
-    )
+    wedge = pie(_at(polygon, contact), rays, polygon.diameter, **style)
     drawn.ax.add_patch(wedge)
     wedge.set_clip_path(drawn.fill.get_path(), drawn.ax.transData)
     return wedge
 
 
-def _draw_line(ax: Axes, ends: FloatArray) -> Line2D:
-    line = Line2D(
-        *ends.T,
-        color=palette.GREEN,
-        linestyle=palette.DASHES,
-        linewidth=1.4,
-        zorder=palette.LINE_LAYER,
-    )
+def pie(apex: FloatArray, rays: FloatArray, radius: float, **style: Any) -> Wedge:
+    """Return a cone as a pie.
+
+    Parameters
+    ----------
+    apex : numpy.ndarray, shape (2,)
+    rays : numpy.ndarray, shape (2, 2)
+        Its clockwise and its counter-clockwise boundary, less than a half turn apart.
+    radius : float
+    **style
+        Its looks.
+    """
+    first, turn = np.arctan2(rays[0, 1], rays[0, 0]), np.arctan2(cross(*rays), rays[0] @ rays[1])
+    angles = first + np.linspace(0, turn, 33)
+    rim = apex + radius * np.stack((np.cos(angles), np.sin(angles)), axis=1)
+    return Wedge(np.vstack((apex, rim)), closed=True, **style)
+
+
+def draw_line(ax: Axes, points: FloatArray, **style: Any) -> Line2D:
+    """Draw points, shape (K, 2), joined by a line."""
+    line = Line2D(*points.T, **style)
     ax.add_line(line)
     return line
 
@@ -354,43 +373,23 @@ def _place_fingers(
 def _draw_finger(
     ax: Axes, frame: Frame, finger: int, placed: Placed, style: _Style
 ) -> FingerArtists:
-    x, y = frame.coordinates(placed.anchor)
-    to = frame.coordinates(placed.center)
+    at, to = frame.coordinates(placed.anchor), frame.coordinates(placed.center)
     beside = shifted(ax, placed.center - placed.anchor)
     ring: dict[str, Any] = {"markeredgecolor": style.ring, "linestyle": "none", "marker": "o"}
-    dot = Line2D(
-        [x],
-        [y],
-        markersize=3.6,
-        markerfacecolor=style.contact,
-        markeredgewidth=0.8,
-        zorder=palette.CONTACT_LAYER,
-        **ring,
-    )
-    leader = Line2D(
-        [x, to[0]],
-        [y, to[1]],
-        color=style.ring,
-        linewidth=0.9,
-        linestyle=style.line,
-        zorder=palette.LEADER_LAYER,
-    )
-    circle = Line2D(
-        [x],
-        [y],
-        markersize=2 * palette.FINGER_RADIUS,
-        markerfacecolor=style.face,
-        markeredgewidth=style.width,
-        transform=beside,
-        zorder=palette.FINGER_LAYER,
-        **ring,
-    )
-    for artist in (dot, leader, circle):
-        ax.add_line(artist)
+    small = {"markersize": 3.6, "markerfacecolor": style.contact, "markeredgewidth": 0.8}
+    dot = draw_line(ax, at[None], zorder=palette.CONTACT_LAYER, **ring, **small)
+    thin: dict[str, Any] = {"color": style.ring, "linewidth": 0.9, "linestyle": style.line}
+    leader = draw_line(ax, np.stack((at, to)), zorder=palette.LEADER_LAYER, **thin)
+    large = {
+        "markersize": 2 * palette.FINGER_RADIUS,
+        "markerfacecolor": style.face,
+        "markeredgewidth": style.width,
+    }
+    circle = draw_line(ax, at[None], transform=beside, zorder=palette.FINGER_LAYER, **ring, **large)
     size = palette.FINGER_FONT if finger < 10 else palette.FINGER_FONT - 2
     number = ax.text(
-        x,
-        y,
+        at[0],
+        at[1],
         str(finger),
         transform=beside,
         ha="center",

@@ -50,7 +50,7 @@ class Window:
         return 0 < (angle - self.first) % (2 * np.pi) < self.last - self.first
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(frozen=True, eq=False, repr=False)
 class CandidateArtists(Drawing):
     """What `plot_candidates` drew.
 
@@ -84,6 +84,8 @@ def plot_candidates(
     kind: str,
     edges: Sequence[int] = (),
     ax: Axes | None = None,
+    *,
+    key: bool = True,
 ) -> CandidateArtists:
     """Draw the normals of all edges on the circle, and which of them may come next.
 
@@ -113,6 +115,8 @@ def plot_candidates(
         centre). Without, filled dots are the edges that are in any candidate.
     ax : matplotlib.axes.Axes, optional
         By default new axes of a new figure.
+    key : bool, optional
+        Whether to say what the colours mean.
 
     Returns
     -------
@@ -150,12 +154,9 @@ def plot_candidates(
     ]
     arrows = {i: _draw_normal(ax, angles[i], looks[i]) for i in range(cones.n_edges)}
     numbers = _draw_numbers(ax, angles, looks)
-    _write_key(
-        ax,
-        chosen,
-        bool(sectors),
-        f"{count} {palette.KIND_NAMES[kind]} candidate" + "s" * (count != 1),
-    )
+    if key:
+        words = f"{count} {palette.KIND_NAMES[kind]} candidate" + "s" * (count != 1)
+        _write_key(ax, chosen, bool(sectors), words)
     return CandidateArtists(
         ax,
         chosen,
@@ -292,17 +293,8 @@ def _draw_sectors(
 
 def _draw_normal(ax: Axes, angle: float, look: _Look) -> Line2D:
     """The normal as a line from the centre to its mark on the circle."""
-    (arrow,) = ax.plot(
-        [0, np.cos(angle)],
-        [0, np.sin(angle)],
-        color=look.color,
-        linewidth=look.width,
-        marker=look.marker,
-        markevery=[1],
-        markersize=look.size,
-        markerfacecolor=look.face,
-        zorder=look.layer,
-    )
+    ends = [0, np.cos(angle)], [0, np.sin(angle)]
+    (arrow,) = ax.plot(*ends, markevery=[1], zorder=look.layer, **_style(look))
     return arrow
 
 
@@ -349,43 +341,25 @@ def _write_number(
 def _write_key(ax: Axes, chosen: tuple[int, ...], window: bool, count: str) -> None:
     """Write how many candidates there are and what the marks mean, over the axes."""
     named = " and ".join(map(str, chosen))
-    text = f"{count} with {named}" if chosen else count
+    title = f"{count} with {named}" if chosen else count
+    together = ("", " with it", " with them")[len(chosen)]
+    labels = [(_NEXT, f"in a candidate{together}"), (_OTHER, "in none")]
+    if chosen:
+        labels.insert(0, (_CHOSEN, "chosen"))
     keys: list[Line2D | Patch] = [
-        Line2D(
-            [],
-            [],
-            color=look.color,
-            marker=look.marker,
-            markerfacecolor=look.face,
-            label=label,
-            markersize=look.size,
-            linewidth=look.width,
-        )
-        for look, label in (
-            (_CHOSEN, "chosen" if chosen else ""),
-            (
-                _NEXT,
-                "in a candidate with it"
-                if len(chosen) == 1
-                else "in a candidate with them"
-                if chosen
-                else "in a candidate",
-            ),
-            (_OTHER, "in none"),
-        )
-        if label
+        Line2D([], [], label=label, **_style(look)) for look, label in labels
     ]
     if window:
         keys.append(Patch(facecolor=(palette.SKY, _SHADE), edgecolor=palette.SKY, label="window"))
-    ax.legend(
-        handles=keys,
-        title=text,
-        title_fontsize=9,
-        alignment="left",
-        fontsize=8,
-        ncols=2,
-        frameon=False,
-        loc="lower left",
-        bbox_to_anchor=(0.02, 0.98),
-        borderaxespad=0,
-    )
+    place: dict[str, Any] = {"bbox_to_anchor": (0.02, 0.98), "borderaxespad": 0}
+    ax.legend(handles=keys, title=title, ncols=2, **palette.KEY_OVER_AXES, **place)
+
+
+def _style(look: _Look) -> dict[str, Any]:
+    return {
+        "color": look.color,
+        "linewidth": look.width,
+        "marker": look.marker,
+        "markersize": look.size,
+        "markerfacecolor": look.face,
+    }

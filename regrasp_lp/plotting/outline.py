@@ -41,7 +41,7 @@ _SIZES = ((24, 6.0, 9.0), (60, 7.5, 8.0), (150, 9.5, 7.0), (10**9, 12.0, 6.0))
 """Up to how many edges; the longer side of the axes in inches; the size of the numbers."""
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(frozen=True, eq=False, repr=False)
 class PolygonArtists(Drawing):
     """What `plot_polygon` drew.
 

@@ -6,6 +6,8 @@ of colour blindness; what a colour says is also said by a line style or a shape,
 
 from __future__ import annotations
 
+from typing import Any
+
 INK = "#262626"
 GREY = "#8A8A8A"
 MATERIAL = "#EFEFEC"
@@ -29,6 +31,14 @@ KIND_MARKERS = {"two_finger": "^", "concurrent": "o", "parallel": "s", "three_fi
 KIND_NAMES = {kind: kind.replace("_", "-") for kind in KIND_COLORS}
 
 DASHES = (0, (4, 2.5))  # of the line of a two-finger grasp, in line widths
+
+KEY_OVER_AXES: dict[str, Any] = {  # with a title; where exactly is told to each
+    "loc": "lower left",
+    "alignment": "left",
+    "fontsize": 8,
+    "title_fontsize": 9,
+    "frameon": False,
+}
 
 FINGER_RADIUS = 7.0
 FINGER_FONT = 8.5

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from types import MappingProxyType
 from typing import Any
 
@@ -19,11 +19,11 @@ from regrasp_lp.errors import OptionError
 from regrasp_lp.friction import FloatArray
 from regrasp_lp.grasp_sets.candidates import common_cone
 from regrasp_lp.grasp_sets.collection import GraspSet
-from regrasp_lp.grasp_sets.focus import in_object
 from regrasp_lp.grasp_sets.sweeps import Sweeps
 from regrasp_lp.linear_sets import LinearSets
 from regrasp_lp.plotting import palette
 from regrasp_lp.plotting.frame import Drawing
+from regrasp_lp.plotting.grasps import FORCE, draw_line, pie
 from regrasp_lp.plotting.scene import (
     CONE,
     DOT,
@@ -34,8 +34,8 @@ from regrasp_lp.plotting.scene import (
     draw_dot,
     draw_sets,
     grown,
-    pie,
     set_scene,
+    swept,
 )
 
 _AROUND = 0.12  # part of the diameter to show around the object
@@ -56,16 +56,10 @@ _CENTER: dict[str, Any] = {"marker": "s", "markersize": 7.5}
 _CROSSING: dict[str, Any] = {"marker": "D", "markersize": 5.5, "markerfacecolor": "white"}
 _SEGMENT: dict[str, Any] = {"color": palette.INK, "linewidth": 1.1, "zorder": palette.LINE_LAYER}
 _INSIDE: dict[str, Any] = {"color": palette.VERMILLION, "linewidth": 2.6}
-_FORCE: dict[str, Any] = {
-    "color": palette.GREEN,
-    "linestyle": palette.DASHES,
-    "linewidth": 1.4,
-    "zorder": palette.LINE_LAYER,
-}
 _CENTER_EDGE: dict[str, Any] = {**EDGE, "color": palette.BLUE, "linewidth": 4.0}
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(frozen=True, eq=False, repr=False)
 class CommonConeArtists(Drawing):
     """What `plot_common_cone` drew.
 
@@ -100,7 +94,7 @@ class CommonConeArtists(Drawing):
     forces: Mapping[int, Line2D]
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(frozen=True, eq=False, repr=False)
 class UnionVolumeArtists(Drawing):
     """What `plot_union_volume` drew.
 
@@ -126,7 +120,8 @@ def plot_common_cone(
 
     The common cone, drawn at the centre contact on both sides, leaves two outer regions. Where the
     segment between the other contacts is in the cone, any point of it tells a direction of forces
-    that is in all three cones.
+    that is in all three cones; if it meets the cone in the centre contact alone, all directions in
+    the cone will do.
 
     Parameters
     ----------
@@ -170,7 +165,7 @@ def plot_common_cone(
     signs, avoid = _cone_signs() if key else [], [crossing, *at.values()]
     scene = set_scene(polygon, grasp_set.edges, _view(grasp_set), ax, signs, avoid=avoid)
     far = 2 * float(np.hypot(*(scene.window[2:] - scene.window[:2])))
-    outer = {edge: pie(at[edge], rays, _SMALL * polygon.diameter) for edge in (b, c)}
+    outer = {edge: pie(at[edge], rays, _SMALL * polygon.diameter, **CONE) for edge in (b, c)}
     position = next(contact.position for contact in resolved if contact.edge == center)
     return CommonConeArtists(
         scene.ax,
@@ -179,10 +174,10 @@ def plot_common_cone(
         _draw_outer(scene, grasp_set.outer_regions(position)),
         draw_double_cone(scene.ax, at[center], rays, far),
         draw_cones(scene, outer),
-        _line(scene.ax, np.stack((at[b], at[c])), _SEGMENT),
-        _line(scene.ax, part, {**_SEGMENT, **_INSIDE}),
+        draw_line(scene.ax, np.stack((at[b], at[c])), **_SEGMENT),
+        draw_line(scene.ax, part, **{**_SEGMENT, **_INSIDE}),
         draw_dot(scene.ax, crossing, **_CROSSING),
-        _forces(scene.ax, at, crossing - at[center], far),
+        _forces(scene.ax, at, far * _direction(crossing - at[center], rays)),
     )
 
 
@@ -258,15 +253,23 @@ def _part_in_cone(apex: FloatArray, rays: FloatArray, b: FloatArray, c: FloatArr
     return np.asarray(b + cuts[best : best + 2, None] * along)
 
 
+def _direction(toward: FloatArray, rays: FloatArray) -> FloatArray:
+    """Return a unit vector in a double-sided cone: along `toward`, or in the middle of the cone.
+
+    The middle is for three contacts on one line, which meets the cone in its apex alone.
+    """
+    if cross(rays[0], toward) * cross(toward, rays[1]) <= 0:
+        toward = rays.sum(axis=0)
+    return np.asarray(toward / np.hypot(*toward))
+
+
 def _union_volume(grasp_set: GraspSet, center: int) -> LinearSets:
     """Return the common cones at all points of the centre edge, one set for each side of it."""
     cones = grasp_set.torque.cones
     others = [edge for edge in grasp_set.edges if edge != center]
     common = common_cone(cones, np.array([[center, *others]]))
     sweeps = Sweeps.of_rays(cones, np.array([center]), common.ray, -common.sign)
-    sides = in_object(cones, sweeps.linear_sets(np.array([[0], [1]])))
-    everywhere = np.full_like(sides.lower, np.inf)
-    return replace(sides, lower=-everywhere, upper=everywhere)
+    return swept(sweeps, np.array([[0], [1]]))
 
 
 # --- drawing ------------------------------------------------------------------------------------
@@ -276,7 +279,7 @@ def draw_double_cone(
     ax: Axes, apex: FloatArray, rays: FloatArray, radius: float
 ) -> tuple[Wedge, Wedge]:
     """Draw both sides of the common cone."""
-    sides = pie(apex, rays, radius), pie(apex, -rays, radius)
+    sides = pie(apex, rays, radius, **CONE), pie(apex, -rays, radius, **CONE)
     for side in sides:
         ax.add_patch(side)
     return sides
@@ -292,18 +295,10 @@ def _dots(scene: Scene, at: Mapping[int, FloatArray], center: int) -> Mapping[in
     )
 
 
-def _line(ax: Axes, ends: FloatArray, style: dict[str, Any]) -> Line2D:
-    line = Line2D(*ends.T, **style)
-    ax.add_line(line)
-    return line
-
-
-def _forces(
-    ax: Axes, at: Mapping[int, FloatArray], direction: FloatArray, far: float
-) -> Mapping[int, Line2D]:
-    """Draw parallel lines through the contacts, across the axes."""
-    reach = np.outer((-far, far), direction / np.hypot(*direction))
-    return MappingProxyType({edge: _line(ax, p + reach, _FORCE) for edge, p in at.items()})
+def _forces(ax: Axes, at: Mapping[int, FloatArray], reach: FloatArray) -> Mapping[int, Line2D]:
+    """Draw parallel lines through the contacts, as far as `reach` to both sides."""
+    ends = np.stack((-reach, reach))
+    return MappingProxyType({e: draw_line(ax, p + ends, **FORCE) for e, p in at.items()})
 
 
 # --- keys ---------------------------------------------------------------------------------------
@@ -318,7 +313,7 @@ def _cone_signs() -> list[Sign]:
         Patch(**_LEFT, label="outer region"),
         Patch(**_RIGHT, label="other outer region"),
         Line2D([], [], **{**_SEGMENT, **_INSIDE}, label="segment within the cone"),
-        Line2D([], [], **_FORCE, label="parallel forces"),
+        Line2D([], [], **FORCE, label="parallel forces"),
     ]
 
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Collection, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from types import MappingProxyType
 from typing import Any
 
@@ -18,10 +18,13 @@ from matplotlib.path import Path
 from matplotlib.patheffects import withStroke
 from matplotlib.text import Text
 
-from regrasp_lp.friction import FloatArray
+from regrasp_lp.friction import FloatArray, IntArray
+from regrasp_lp.grasp_sets.focus import in_object
+from regrasp_lp.grasp_sets.sweeps import Sweeps
 from regrasp_lp.linear_sets import LinearSets
 from regrasp_lp.plotting import palette
 from regrasp_lp.plotting.frame import POINTS_PER_INCH, Drawing, Frame, fit, own_axes, shifted
+from regrasp_lp.plotting.grasps import draw_line
 from regrasp_lp.plotting.outline import PolygonArtists, paper_of, plot_polygon, text_half
 from regrasp_lp.plotting.placement import Label, Search, place
 from regrasp_lp.polygon import Polygon
@@ -71,7 +74,7 @@ DOT: dict[str, Any] = {
 }
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(frozen=True, eq=False, repr=False)
 class Scene(Drawing):
     """An object with some of its edges emphasised, and the key.
 
@@ -135,7 +138,8 @@ def set_scene(
     drawn = plot_polygon(polygon, ax, edge_numbers=False)
     key = _draw_key(ax, signs) if signs else None
     frame = _fit_above(ax, bounds, key)
-    lines = {edge: _draw_edge(ax, polygon, edge) for edge in edges}
+    ends = np.stack((polygon.edge_starts, polygon.edge_ends), axis=1)
+    lines = {edge: draw_line(ax, ends[edge], **EDGE) for edge in edges}
     numbers = _number(ax, polygon, frame, list(edges), frame.points(np.reshape(avoid, (-1, 2))))
     return Scene(ax, drawn, MappingProxyType(lines), MappingProxyType(numbers), key)
 
@@ -173,6 +177,16 @@ def within(sets: LinearSets, window: FloatArray) -> LinearSets:
     return meeting(sets, LinearSets(("x", "y"), rows, np.ones((1, 4)), bounds, low, high))
 
 
+def swept(sweeps: Sweeps, regions: IntArray) -> LinearSets:
+    """Return intersections of regions, rows (K, r) of their numbers, in the object's coordinates.
+
+    They have no box: some are not bounded.
+    """
+    sets = in_object(sweeps.cones, sweeps.linear_sets(regions))
+    everywhere = np.full_like(sets.lower, np.inf)
+    return replace(sets, lower=-everywhere, upper=everywhere)
+
+
 def draw_sets(scene: Scene, sets: LinearSets, **style: Any) -> PathPatch:
     """Draw the union of sets over "x" and "y", as far as the axes show it, as one path."""
     rings = [ring for ring in corners(within(sets, scene.window)) if len(ring)]
@@ -181,25 +195,6 @@ def draw_sets(scene: Scene, sets: LinearSets, **style: Any) -> PathPatch:
     patch = PathPatch(path, **{"zorder": palette.CELL_LAYER, "joinstyle": "round", **style})
     scene.ax.add_patch(patch)
     return patch
-
-
-def pie(apex: FloatArray, rays: FloatArray, radius: float, **style: Any) -> Wedge:
-    """Return a cone as a pie.
-
-    Parameters
-    ----------
-    apex : numpy.ndarray, shape (2,)
-    rays : numpy.ndarray, shape (2, 2)
-        Its clockwise and its counter-clockwise boundary, less than a half turn apart.
-    radius : float
-    **style
-        Overrides the looks of a friction cone.
-    """
-    (ax, ay), (bx, by) = rays
-    first, turn = np.arctan2(ay, ax), np.arctan2(ax * by - ay * bx, ax * bx + ay * by)
-    angles = first + np.linspace(0, turn, 33)
-    rim = apex + radius * np.stack((np.cos(angles), np.sin(angles)), axis=1)
-    return Wedge(np.vstack((apex, rim)), **{"closed": True, **CONE, **style})
 
 
 def draw_cones(scene: Scene, cones: Mapping[int, Wedge]) -> Mapping[int, Wedge]:
@@ -219,22 +214,13 @@ def draw_regions(
     marks = {}
     for edge, region in regions.items():
         ends = polygon.points(edge, region / polygon.edge_lengths[edge])
-        marks[edge] = Line2D(*ends.T, **REGION)
-        scene.ax.add_line(marks[edge])
+        marks[edge] = draw_line(scene.ax, ends, **REGION)
     return MappingProxyType(marks)
 
 
 def draw_dot(ax: Axes, at: FloatArray, **style: Any) -> Line2D:
     """Draw a point with a ring around it."""
-    dot = Line2D([at[0]], [at[1]], **{**DOT, **style})
-    ax.add_line(dot)
-    return dot
-
-
-def _draw_edge(ax: Axes, polygon: Polygon, edge: int) -> Line2D:
-    line = Line2D(*polygon.points(edge, np.array([0.0, 1.0])).T, **EDGE)
-    ax.add_line(line)
-    return line
+    return draw_line(ax, at[None], **{**DOT, **style})
 
 
 def _number(
