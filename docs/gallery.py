@@ -39,7 +39,7 @@ def pictures() -> dict[str, plotting.Drawing]:
     )
     concurrent = widest(graph, "concurrent")[0]
     sets = graph.sets
-    (leave,), (come,) = sets.on_edges((1, 5, 8)), sets.on_edges((5, 8, 13))
+    (leave,), (come,) = sets.on_edges((0, 2, 6)), sets.on_edges((0, 3))
     return {
         "focus_cell": plotting.plot_focus_cell(sets[concurrent]),
         "focus_switch": plotting.plot_focus_switch(graph, leave, come),
