@@ -3,8 +3,8 @@
 For a hand of four fingers two concurrent sets with two common edges are adjacent, and a concurrent
 and a two-finger set with at least one, iff some point q is inside both focus cells (sections
 3.3.2.1 and 3.3.2.2): held fingers stay in their regions of q. All other pairs follow the contact
-rule. The same contacts can be held by focus on different points, so that the edges of this rule are
-a subset of those of the contact rule.
+rule. Contacts may be held also where the two grasps have no focus point in common, so that the
+edges of this rule are a subset of those of the contact rule.
 
 On a common edge the two sides of a double-sided cone have no interior point in common. So two
 concurrent sets over (a, b, c) and (a, b, d) are adjacent iff four regions, one to an edge, meet;

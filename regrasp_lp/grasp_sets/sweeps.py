@@ -39,7 +39,6 @@ _ROUNDINGS = 64 * UNIT_ROUNDOFF
 _OTHERS = ((1, 2), (2, 0), (0, 1))  # than line 0, 1 and 2
 _NEARLY = 1e-6  # a corner of a set, as far as rounding lets one tell
 
-
 LineChoice: TypeAlias = tuple[tuple[int, int], ...]
 """Some lines of some regions: (region, line) each."""
 
