@@ -445,3 +445,12 @@ def test_odd_shapes(name: str, mu: float) -> None:
         for form in ("focus_cell", "double_cones", "subpolytopes"):
             found = getattr(grasp_set, form)
             assert found is None or len(found) >= 1
+
+
+def test_outer_regions_refuse_what_is_no_position() -> None:
+    polygon = LATTICE["ell"]
+    sets = rl.build_switching_graph(polygon, 0.2, sets="chapter").sets
+    parallel = next(s for s in sets if s.kind == "parallel")
+    for position in ("a", -0.1, 1e9, float("nan")):
+        with pytest.raises(rl.OptionError, match="is not on the centre edge"):
+            parallel.outer_regions(position)  # type: ignore[arg-type]

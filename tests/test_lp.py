@@ -258,3 +258,22 @@ def test_solved_and_positive_are_relative_to_the_unit() -> None:
     )
     assert found.solved.tolist() == [False, True]
     assert found.positive.tolist() == [True, False]
+
+
+def test_unbounded_boxes_are_refused() -> None:
+    sets = random_sets(0, 2)
+    far = np.full(sets.lower.shape, np.inf)
+    with pytest.raises(OptionError, match="bounded box"):
+        maximise_margins(replace(sets, upper=far), get_solver("highs"))
+
+
+@pytest.mark.parametrize("name", SOLVERS)
+def test_the_unit_of_a_coordinate_does_not_matter(name: str) -> None:
+    sets = random_sets(1, 20)
+    margins = maximise_margins(sets, get_solver(name)).margins
+    for unit in (1e-12, 1e12):
+        scaled = replace(
+            sets, rows=sets.rows / unit, lower=sets.lower * unit, upper=sets.upper * unit
+        )
+        found = maximise_margins(scaled, get_solver(name)).margins
+        np.testing.assert_allclose(found, margins, atol=1e-7)

@@ -496,3 +496,19 @@ class TestGraph:
         assert plot_graph(bracket, ax).ax is ax
         with pytest.raises(OptionError, match="component"):
             plot_graph(bracket, color="margin")
+
+
+def test_keys_can_be_left_out(chapter: SwitchingGraph) -> None:
+    first, second = parallel_sets(chapter)[:2]
+    on = [next(iter(set(first.edges) & set(second.edges)), first.edges[0])]
+    second = second if on[0] in second.edges else first
+    for key in (True, False):
+        for artists in (
+            plot_subpolytopes(first, key=key),
+            plot_contact_space(first, key=key),
+            plot_projections(first, second, on, key=key),
+            plot_candidates(chapter.polygon, MU, "concurrent", key=key),
+            plot_graph(chapter, key=key),
+        ):
+            assert (artists.ax.get_legend() is not None) == key
+            assert repr(artists).startswith(f"<{type(artists).__name__} on <Axes")
