@@ -107,6 +107,17 @@ class LinearSets:
             self, bounds=self.bounds + self.rows @ by, lower=self.lower + by, upper=self.upper + by
         )
 
+    def in_unit_box(self) -> LinearSets:
+        """Return the same sets over coordinates that run from 0 to 1; the box must be bounded."""
+        width = self.upper - self.lower
+        return replace(
+            self,
+            rows=self.rows * width[:, None, :],
+            bounds=self.bounds - np.einsum("brn,bn->br", self.rows, self.lower),
+            lower=np.zeros(width.shape),
+            upper=np.ones(width.shape),
+        )
+
     def margins(self, points: FloatArray) -> FloatArray:
         """Return the margin of one point per set; -inf outside the box.
 

@@ -44,7 +44,7 @@ def corners(sets: LinearSets) -> list[FloatArray]:
     if not (np.isfinite(sets.lower).all() and np.isfinite(sets.upper).all()):
         raise OptionError("corners are those of sets in a bounded box: join them with one")
     unit = sets.upper - sets.lower
-    halfspaces = _in_unit_box(sets, unit)
+    halfspaces = _halfspaces(sets.in_unit_box())
     void = np.abs(halfspaces.rows).max(axis=2) == 0
     empty = (unit <= 0).any(axis=1) | (void & (halfspaces.bounds < 0)).any(axis=1)
     found = [np.zeros((0, len(sets.names)))] * len(sets)
@@ -59,19 +59,17 @@ def corners(sets: LinearSets) -> list[FloatArray]:
     return found
 
 
-def _in_unit_box(sets: LinearSets, unit: FloatArray) -> LinearSets:
-    """Rows of length 1, those of the box among them, over coordinates from 0 to 1."""
+def _halfspaces(sets: LinearSets) -> LinearSets:
+    """Rows of length 1, and those of the unit box among them."""
     b, n = sets.lower.shape
-    rows = sets.rows * unit[:, None, :]
-    bounds = sets.bounds - np.einsum("brn,bn->br", sets.rows, sets.lower)
-    length = np.linalg.norm(rows, axis=2)
+    length = np.linalg.norm(sets.rows, axis=2)
     length = np.where(length > 0, length, 1.0)
     box = np.tile(np.concatenate((np.eye(n), -np.eye(n))), (b, 1, 1))
     limits = np.tile(np.concatenate((np.ones(n), np.zeros(n))), (b, 1))
-    rows = np.concatenate((rows / length[..., None], box), axis=1)
+    rows = np.concatenate((sets.rows / length[..., None], box), axis=1)
     scales = np.where(np.abs(rows).max(axis=2) > 0, 1.0, 0.0)
-    bounds = np.concatenate((bounds / length, limits), axis=1)
-    return LinearSets(sets.names, rows, scales, bounds, np.zeros((b, n)), np.ones((b, n)))
+    bounds = np.concatenate((sets.bounds / length, limits), axis=1)
+    return LinearSets(sets.names, rows, scales, bounds, sets.lower, sets.upper)
 
 
 def _apart(points: FloatArray) -> FloatArray:

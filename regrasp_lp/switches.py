@@ -69,18 +69,13 @@ class SwitchRule:
         return np.concatenate([np.full(len(f), f.m, dtype=np.intp) for f in self.sources])
 
     @cached_property
-    def need(self) -> IntArray:
-        """``need[n, m]``: contacts to hold between sets over n and m contacts."""
-        return np.array([[self.hand.held(n, m) for m in range(4)] for n in range(4)])
-
-    @cached_property
     def _levels(self) -> tuple[_Level, ...]:
         """The projections on 1, 2 and 3 contacts, grouped by edges; those that can matter."""
         return tuple(
             _Level.of(shadows(self.sources, held), self)
             for held in (1, 2, 3)
             if any(
-                held <= min(f.m, g.m) and held >= self.need[f.m, g.m]
+                held <= min(f.m, g.m) and held >= self.hand.needs[f.m, g.m]
                 for f in self.sources
                 for g in self.sources
             )
@@ -122,7 +117,7 @@ class SwitchRule:
         """Rows (i, j, held) of the feasible ones among pairs of projections."""
         i, j = level.owner[first], level.owner[second]
         held = level.shadows.held
-        useful = (i != j) & (held >= self.need[self.contacts[i], self.contacts[j]])
+        useful = (i != j) & (held >= self.hand.needs[self.contacts[i], self.contacts[j]])
         first, second, i, j = first[useful], second[useful], i[useful], j[useful]
         yes = self.decide(level.shadows.take(first), level.shadows.take(second))
         i, j = i[yes], j[yes]
@@ -165,7 +160,7 @@ class _Level:
         group = np.cumsum(new) - 1
         rank = np.arange(len(stack)) - starts[group]
         pairs = np.add.reduceat(contacts == 2, starts) if len(starts) else starts
-        suffices = rule.need <= stack.held
+        suffices = rule.hand.needs <= stack.held
         last = np.where(
             suffices[contacts, 3], sizes[group], np.where(suffices[contacts, 2], pairs[group], 0)
         )

@@ -214,7 +214,7 @@ class SwitchingGraph:
 
         n, contacts = len(self), self.sets.contacts
         kinds = np.arange(len(self.sets.families)).repeat(np.diff(self.sets.offsets))
-        need = np.array([[self.hand.held(a, b) for b in range(4)] for a in range(4)])
+        need = self.hand.needs
 
         def united(labels: IntArray, i: IntArray, j: IntArray) -> IntArray:
             one, other = labels[i], labels[j]

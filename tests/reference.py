@@ -67,7 +67,7 @@ def cross(p: Vector, q: Vector) -> int:
 def lowest(values: Ints) -> Ints:
     """The same ray in the smallest whole numbers."""
     common = gcd(*values)
-    return tuple(v // common for v in values) if common > 1 else values  # type: ignore[return-value]
+    return tuple(v // common for v in values) if common > 1 else values
 
 
 def value(row: Row, point: Point) -> int:
@@ -369,7 +369,7 @@ class Scene:
 
 
 def negative(row: Ints) -> Ints:
-    return tuple(-v for v in row)  # type: ignore[return-value]
+    return tuple(-v for v in row)
 
 
 def _pieces(points: list[Point]) -> Region:

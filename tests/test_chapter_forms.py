@@ -453,4 +453,4 @@ def test_outer_regions_refuse_what_is_no_position() -> None:
     parallel = next(s for s in sets if s.kind == "parallel")
     for position in ("a", -0.1, 1e9, float("nan")):
         with pytest.raises(rl.OptionError, match="is not on the centre edge"):
-            parallel.outer_regions(position)  # type: ignore[arg-type]
+            parallel.outer_regions(position)

@@ -150,6 +150,10 @@ class CommonCones:
     ray: IntArray
     sign: IntArray
 
+    def boundaries(self, cones: Cones) -> FloatArray:
+        """Return unit vectors along both boundaries, shape (N, 2, 2)."""
+        return np.asarray(cones.unit_rays[self.ray] * self.sign[..., None])
+
 
 def common_cone(cones: Cones, triples: IntArray) -> CommonCones:
     """Return the common cones of triples (a, b, c) with centre a, by exact signs.

@@ -17,7 +17,7 @@ from regrasp_lp.friction import FloatArray, IntArray
 from regrasp_lp.grasp_sets.double_cones import double_cones
 from regrasp_lp.grasp_sets.focus import focus_cell, independent_regions
 from regrasp_lp.grasp_sets.parallel import common_cone_rays, outer_regions, subpolytopes
-from regrasp_lp.grasp_sets.pieces import in_positions, piece_sets
+from regrasp_lp.grasp_sets.pieces import in_positions, order_rows, piece_sets
 from regrasp_lp.grasp_sets.vertices import Family
 from regrasp_lp.linear_sets import LinearSets
 from regrasp_lp.margins import existing_pieces
@@ -340,12 +340,8 @@ class GraspSets(Sequence[GraspSet]):
 
 def _in_order(sets: LinearSets, edges: tuple[int, ...]) -> LinearSets:
     """Add ``u_i - u_{i+1} <= 0`` where two contacts are on one edge."""
-    rows = [
-        np.eye(len(edges))[i] - np.eye(len(edges))[i + 1]
-        for i in range(len(edges) - 1)
-        if edges[i] == edges[i + 1]
-    ]
-    if not rows:
+    rows = order_rows(edges)
+    if not len(rows):
         return sets
     zeros = np.zeros((len(sets), len(rows)))
     return LinearSets(

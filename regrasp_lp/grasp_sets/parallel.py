@@ -47,7 +47,7 @@ def common_cone_rays(cones: Cones, center: int, others: Sequence[int]) -> FloatA
         The clockwise (right) and the counter-clockwise (left) boundary.
     """
     common = common_cone(cones, np.array([[center, *others]]))
-    return np.asarray(cones.unit_rays[common.ray[0]] * common.sign[0][:, None])
+    return np.asarray(common.boundaries(cones)[0])
 
 
 def outer_regions(cones: Cones, center: int, others: Sequence[int], span: FloatArray) -> LinearSets:

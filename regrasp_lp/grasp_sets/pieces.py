@@ -94,6 +94,27 @@ def _apart(functions: TorqueFunctions, row: IntArray) -> tuple[FloatArray, Float
     return rows, bounds
 
 
+def order_rows(edges: Sequence[int]) -> FloatArray:
+    """Return rows of ``u_i - u_{i+1} <= 0``, one where two contacts are on one edge.
+
+    Parameters
+    ----------
+    edges : sequence of int
+        Ascending.
+
+    Returns
+    -------
+    numpy.ndarray, shape (K, m)
+
+    Examples
+    --------
+    >>> order_rows((3, 3, 5)).tolist()
+    [[1.0, -1.0, 0.0]]
+    """
+    steps = np.eye(len(edges))[:-1] - np.eye(len(edges))[1:]
+    return np.asarray(steps[np.equal(edges[1:], edges[:-1])])
+
+
 def in_positions(sets: LinearSets, lengths: Sequence[float]) -> LinearSets:
     """Return linear sets over fractions as sets over positions ``u = f l``.
 

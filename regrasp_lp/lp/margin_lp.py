@@ -130,7 +130,7 @@ def maximise_margins(
 
 def _solve_stack(sets: LinearSets, solver: Solver) -> MarginSolutions:
     width = sets.upper - sets.lower
-    boxed = _in_unit_box(sets, width)
+    boxed = sets.in_unit_box()  # solvers have absolute tolerances
     units = np.maximum(
         np.abs(boxed.rows).max(axis=(1, 2), initial=0.0),
         np.abs(boxed.bounds).max(axis=1, initial=0.0),
@@ -165,17 +165,6 @@ def _solve_stack(sets: LinearSets, solver: Solver) -> MarginSolutions:
         merged[field] = getattr(solution, field).copy()
         merged[field][open_] = getattr(again, field)
     return MarginSolutions(merged["points"], merged["margins"], merged["bounds"], units)
-
-
-def _in_unit_box(sets: LinearSets, width: FloatArray) -> LinearSets:
-    """The same sets over coordinates that run from 0 to 1: solvers have absolute tolerances."""
-    return replace(
-        sets,
-        rows=sets.rows * width[:, None, :],
-        bounds=sets.bounds - np.einsum("brn,bn->br", sets.rows, sets.lower),
-        lower=np.zeros(width.shape),
-        upper=np.ones(width.shape),
-    )
 
 
 def enclose(

@@ -5,6 +5,9 @@ from __future__ import annotations
 import operator
 from dataclasses import dataclass
 
+import numpy as np
+from numpy.typing import NDArray
+
 from regrasp_lp.errors import HandError
 
 
@@ -48,3 +51,9 @@ class Hand:
         ``max(0, n_S + n_T - k)``: while it switches, the hand touches both grasps at once.
         """
         return max(0, contacts + others - self.fingers)
+
+    @property
+    def needs(self) -> NDArray[np.intp]:
+        """``needs[n, m]``: the same for grasps of up to three contacts, shape (4, 4)."""
+        touching = np.add.outer(np.arange(4), np.arange(4))
+        return np.asarray(np.maximum(0, touching - self.fingers))

@@ -118,14 +118,9 @@ def plot_graph(
 # --- switches -----------------------------------------------------------------------------------
 
 
-def _needs(graph: SwitchingGraph) -> IntArray:
-    """``needs[n, m]``: contacts to hold between sets over n and m contacts."""
-    return np.array([[graph.hand.held(n, m) for m in range(4)] for n in range(4)])
-
-
 def _listed(graph: SwitchingGraph) -> IntArray:
     """The pairs of sets that have to hold contacts in common and can, shape (K, 2)."""
-    need, contacts = _needs(graph), graph.sets.contacts
+    need, contacts = graph.hand.needs, graph.sets.contacts
     chunks = [np.zeros((0, 2), dtype=np.intp)]
     for i, j, _ in graph.switches.pairs():
         holds = need[contacts[i], contacts[j]] > 0
@@ -135,7 +130,7 @@ def _listed(graph: SwitchingGraph) -> IntArray:
 
 def _implicit(graph: SwitchingGraph) -> IntArray:
     """The pairs that need to hold nothing, shape (K, 2); none if they are too many to draw."""
-    need, contacts = _needs(graph), graph.sets.contacts
+    need, contacts = graph.hand.needs, graph.sets.contacts
     of = {m: np.flatnonzero(contacts == m) for m in (2, 3)}
     free = [(n, m) for n, m in ((2, 2), (2, 3), (3, 3)) if need[n, m] == 0]
     count = sum(
@@ -149,7 +144,7 @@ def _implicit(graph: SwitchingGraph) -> IntArray:
 
 def _joined_to_all(graph: SwitchingGraph) -> BoolArray:
     """Which sets are adjacent to all of some number of contacts, shape (N,)."""
-    need, contacts = _needs(graph), graph.sets.contacts
+    need, contacts = graph.hand.needs, graph.sets.contacts
     return np.asarray((need[contacts][:, np.unique(contacts)] == 0).any(axis=1))
 
 

@@ -229,7 +229,7 @@ def _cone_rays(
     if len(edges) == 3 and len(others) == 2:
         common = common_cone(cones, np.array([[center, *others]]))
         if common.exists[0]:
-            rays = cones.unit_rays[common.ray[0]] * common.sign[0][:, None]
+            rays = common.boundaries(cones)[0]
             of_edges = {k: -rays if edge == center else rays for k, edge in edges.items()}
             return of_edges, COMMON_CONE
     return {k: cones.unit_rays[[2 * edge, 2 * edge + 1]] for k, edge in edges.items()}, _CONE
@@ -242,26 +242,18 @@ def _draw_support(
     holding: Mapping[int, Contact],
     center: int | None,
 ) -> tuple[dict[int, Wedge], Line2D | None]:
-    """Draw the line of two fingers, or the cones of any other number of them."""
+    """Draw the line of two fingers, or the cones of any other number, as far as in the object."""
     if len(holding) == 2:
         ends = np.stack([_at(polygon, contact) for contact in holding.values()])
         return {}, draw_line(drawn.ax, ends, **FORCE)
     rays, style = _cone_rays(cones, holding, center)
-    return {k: _draw_cone(drawn, polygon, c, rays[k], style) for k, c in holding.items()}, None
-
-
-def _draw_cone(
-    drawn: PolygonArtists,
-    polygon: Polygon,
-    contact: Contact,
-    rays: FloatArray,
-    style: dict[str, Any],
-) -> Wedge:
-    """Draw a cone as a pie as large as the object, clipped to it."""
-    wedge = pie(_at(polygon, contact), rays, polygon.diameter, **style)
-    drawn.ax.add_patch(wedge)
-    wedge.set_clip_path(drawn.fill.get_path(), drawn.ax.transData)
-    return wedge
+    wedges = {
+        k: pie(_at(polygon, c), rays[k], polygon.diameter, **style) for k, c in holding.items()
+    }
+    for wedge in wedges.values():
+        drawn.ax.add_patch(wedge)
+        wedge.set_clip_path(drawn.fill.get_path(), drawn.ax.transData)
+    return wedges, None
 
 
 def pie(apex: FloatArray, rays: FloatArray, radius: float, **style: Any) -> Wedge:

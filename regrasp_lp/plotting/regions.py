@@ -20,7 +20,7 @@ from scipy.spatial import ConvexHull
 from regrasp_lp.errors import OptionError
 from regrasp_lp.friction import BoolArray, FloatArray
 from regrasp_lp.grasp_sets.collection import GraspSet
-from regrasp_lp.grasp_sets.pieces import in_positions
+from regrasp_lp.grasp_sets.pieces import in_positions, order_rows
 from regrasp_lp.linear_sets import LinearSets
 from regrasp_lp.polytopes import corners
 
@@ -45,18 +45,12 @@ def body(grasp_set: GraspSet, sign: int) -> FloatArray:
     numpy.ndarray, shape (K, m)
         As `corners`; empty where there is no such body.
     """
-    torque, order = grasp_set.torque, _order(grasp_set)
+    torque, order = grasp_set.torque, order_rows(grasp_set.edges)
     rows = np.concatenate((sign * torque.slopes[0], order))[None]
     bounds = np.append(-sign * torque.offsets[0], np.zeros(len(order)))[None]
     box = np.zeros((1, torque.m)), np.ones((1, torque.m))
     sets = LinearSets(grasp_set.names, rows, np.ones(bounds.shape), bounds, *box)
     return corners(in_positions(sets, torque.lengths[0]))[0]
-
-
-def _order(grasp_set: GraspSet) -> FloatArray:
-    """Rows of ``f_i - f_{i+1} <= 0`` where two contacts are on one edge."""
-    edges, steps = np.array(grasp_set.edges), -np.diff(np.eye(grasp_set.torque.m), axis=0)
-    return np.asarray(steps[edges[1:] == edges[:-1]])
 
 
 @dataclass(frozen=True, eq=False)
@@ -158,7 +152,7 @@ def side(grasp_set: GraspSet, shown: Sequence[int], at: float) -> Region:
     """Return a set over the fractions of two contacts, a third one at one end of its edge."""
     rows = _rows(grasp_set, shown, at)
     region = Region((rows,), (rows,))
-    for step in _order(grasp_set):
+    for step in order_rows(grasp_set.edges):
         a, b = step[list(shown)]
         row = np.array([[at * (step.sum() - a - b), a, b]])  # negative where in order
         region &= Region((), (row,)) if b >= 0 else Region((-row,), ())
