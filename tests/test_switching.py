@@ -654,7 +654,7 @@ def test_pairs_and_neighbours_are_two_views_of_one_relation(name: str, fingers: 
     # Once as stored and, with the largest number among repetitions, as found on demand.
     assert as_mapping(stored.pairs()) == both
     assert as_mapping(on_demand.pairs()) == both
-    needed = rule.need[rule.contacts[first], rule.contacts[second]]
+    needed = rule.hand.needs[rule.contacts[first], rule.contacts[second]]
     assert (held >= np.maximum(needed, 1)).all()
 
 
