@@ -16,6 +16,8 @@ Examples
 """
 
 from regrasp_lp.build import build_switching_graph, plan_regrasp
+from regrasp_lp.certification import Certification, certify
+from regrasp_lp.completeness import Coverage, coverage
 from regrasp_lp.contact import Contact, Grasp
 from regrasp_lp.errors import (
     ContactError,
@@ -34,6 +36,7 @@ from regrasp_lp.files import read_polygons
 from regrasp_lp.force_closure import is_force_closure, least_friction
 from regrasp_lp.graph_file import load_graph
 from regrasp_lp.grasp_sets.collection import GraspSet
+from regrasp_lp.many import Built, build_switching_graphs
 from regrasp_lp.planning.hand import Hand
 from regrasp_lp.planning.plan import Plan
 from regrasp_lp.planning.plan_file import check_plan, read_plan
@@ -45,8 +48,11 @@ from regrasp_lp.switching_graph import SwitchingGraph
 __version__ = "0.1.0"
 
 __all__ = [
+    "Built",
+    "Certification",
     "Contact",
     "ContactError",
+    "Coverage",
     "FileFormatError",
     "FrictionError",
     "Grasp",
@@ -67,7 +73,10 @@ __all__ = [
     "SolverError",
     "SwitchingGraph",
     "build_switching_graph",
+    "build_switching_graphs",
+    "certify",
     "check_plan",
+    "coverage",
     "is_force_closure",
     "least_friction",
     "load_graph",

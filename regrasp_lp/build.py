@@ -7,13 +7,12 @@ import time
 import numpy as np
 from numpy.typing import ArrayLike
 
+from regrasp_lp.contact_rule import meet_by_lp, meet_held
 from regrasp_lp.errors import HandError, OptionError
 from regrasp_lp.focus_rule import FocusRule
-from regrasp_lp.friction import BoolArray, Cones
+from regrasp_lp.friction import Cones, IntArray
 from regrasp_lp.grasp_sets.collection import GraspSets
 from regrasp_lp.grasp_sets.vertices import Progress, build_family, kinds_of
-from regrasp_lp.handovers import decide_held
-from regrasp_lp.joins import best_joins
 from regrasp_lp.lp import Solver, get_solver
 from regrasp_lp.planning.hand import Hand
 from regrasp_lp.planning.on_demand import problem_on_demand
@@ -28,6 +27,7 @@ from regrasp_lp.switches import (
     SwitchesOnDemand,
     SwitchRule,
 )
+from regrasp_lp.switching import Meeting
 from regrasp_lp.switching_graph import GraphOptions, SwitchingGraph
 
 
@@ -88,12 +88,8 @@ def build_switching_graph(
     >>> len(graph.sets), len(graph.components())
     (10, 1)
     """
-    kinds = kinds_of(sets)
-    backend = get_solver(solver)
-    hand = _checked_hand(hand)
-    check_switching(switching, sets, hand)
-    if not (np.isfinite(min_margin) and min_margin >= 0):
-        raise OptionError(f"min_margin must be a finite length >= 0, got {min_margin!r}")
+    hand = check_options(hand, sets, switching, min_margin, solver)
+    kinds, backend = kinds_of(sets), get_solver(solver)
     seconds, started = {}, time.perf_counter()
     cones = Cones.of(polygon, friction)
     families = tuple(
@@ -113,10 +109,24 @@ def build_switching_graph(
     if rule.n_pairs > STORE_LIMIT:
         switches = SwitchesOnDemand(rule)
     else:
-        switches = StoredSwitches.of_pairs(len(grasp_sets), *rule.pairs(progress))
+        switches = StoredSwitches.of_pairs(len(grasp_sets), rule.pairs(progress))
     seconds["switches"] = time.perf_counter() - started
     options = GraphOptions(sets, switching, float(min_margin), solver, presolve)
     return SwitchingGraph(grasp_sets, switches, cones.friction, hand, options, seconds)
+
+
+def check_options(
+    hand: Hand | None, sets: str, switching: str, min_margin: float, solver: str
+) -> Hand:
+    """Return the hand; raise OptionError or HandError if an option means nothing for any object."""
+    kinds_of(sets)
+    if solver not in ("clarabel", "highs"):  # these are not loaded where work is only handed out
+        get_solver(solver)
+    hand = _checked_hand(hand)
+    check_switching(switching, sets, hand)
+    if not (np.isfinite(min_margin) and min_margin >= 0):
+        raise OptionError(f"min_margin must be a finite length >= 0, got {min_margin!r}")
+    return hand
 
 
 def _checked_hand(hand: Hand | None) -> Hand:
@@ -154,30 +164,29 @@ def switch_rule(
 ) -> SwitchRule:
     """Return the contact rule or the focus rule, decided exactly or by margin LPs."""
 
-    def contact(first: Shadows, second: Shadows) -> BoolArray:
-        if presolve and min_margin == 0:
-            return decide_held(first, second, solver)
-        found = decide_held(first, second, solver) if presolve else np.ones(len(first), dtype=bool)
-        open_ = np.flatnonzero(found)
-        joins = best_joins(first.take(open_), second.take(open_), solver, enough=min_margin)
-        found[open_] = joins.exist & (joins.margins > min_margin)
-        return found
+    def contact(
+        first: Shadows, second: Shadows, i: IntArray | None = None, j: IntArray | None = None
+    ) -> Meeting:
+        if presolve:
+            return meet_held(first, second, i, j, solver=solver, min_margin=min_margin)
+        aligned = (first if i is None else first.take(i), second if j is None else second.take(j))
+        return meet_by_lp(*aligned, solver, min_margin, exact=False)
 
     if switching == "contact":
         return SwitchRule(sets.sources, hand, contact)
     focus = FocusRule.of(sets)
 
-    def either(first: Shadows, second: Shadows) -> BoolArray:
-        planar = focus.applies(first, second)
-        found = np.zeros(len(first), dtype=bool)
+    def either(first: Shadows, second: Shadows, i: IntArray, j: IntArray) -> Meeting:
+        planar = focus.applies(first.take(i), second.take(j))
         rows = np.flatnonzero(planar)
-        found[rows] = focus.decide(
-            first.take(rows), second.take(rows), None if presolve else solver
+        cells = focus.decide(
+            first.take(i[rows]), second.take(j[rows]), None if presolve else solver
         )
-        # a switch by focus is one by contacts, whose margin is the one that counts
-        rows = np.flatnonzero(found | ~planar if min_margin > 0 else ~planar)
-        found[rows] = contact(first.take(rows), second.take(rows))
-        return found
+        # A switch by focus is one by contacts, whose margin and witness are the ones that count.
+        rows = np.concatenate((rows[cells], np.flatnonzero(~planar)))
+        result = Meeting.unknown(len(i), first.held)
+        result.write(rows, contact(first, second, i[rows], j[rows]))
+        return result
 
     return SwitchRule(sets.sources, hand, either)
 

@@ -50,6 +50,10 @@ class MissingExtraError(RegraspError, ImportError):
         super().__init__(
             f'{purpose} needs {package}, which is not installed: pip install "regrasp_lp[{extra}]"'
         )
+        self._arguments = (package, extra, purpose)
+
+    def __reduce__(self) -> tuple[type[MissingExtraError], tuple[str, str, str]]:
+        return MissingExtraError, self._arguments
 
 
 class NoPlanFound(RegraspError):

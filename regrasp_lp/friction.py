@@ -293,6 +293,11 @@ class Cones:
         """`vectors` as integers, in the unit of `exact_starts`, shape (n, 2)."""
         return self._exact[1]
 
+    @property
+    def exact_unit(self) -> int:
+        """How many of the units of `exact_starts` make one unit of the object."""
+        return self._exact[2]
+
     @cached_property
     def boundary(self) -> Directions:
         """The boundary rays ``rot90(T) ± μ T`` as directions."""

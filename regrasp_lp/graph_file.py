@@ -1,7 +1,7 @@
 """A switching graph in one file.
 
 A ``.npz`` archive of numpy arrays (no pickle) with a JSON header: format "regrasp-graph",
-version 1. Torque functions are not stored but computed again from the edges of the sets.
+version 2. Torque functions are not stored but computed again from the edges of the sets.
 """
 
 from __future__ import annotations
@@ -27,11 +27,11 @@ from regrasp_lp.grasp_sets.vertices import Family, kinds_of
 from regrasp_lp.lp import get_solver
 from regrasp_lp.planning.hand import Hand
 from regrasp_lp.polygon import Polygon
-from regrasp_lp.switches import StoredSwitches, Switches, SwitchesOnDemand
+from regrasp_lp.switches import SWITCH_ARRAYS, StoredSwitches, Switches, SwitchesOnDemand
 from regrasp_lp.switching_graph import GraphOptions, SwitchingGraph
 from regrasp_lp.torque import torque_functions
 
-FORMAT, VERSION = "regrasp-graph", 1
+FORMAT, VERSION = "regrasp-graph", 2
 
 # What numpy, zipfile, zlib and json raise on a file that is none, or not whole.
 _DAMAGED = (
@@ -54,6 +54,11 @@ def save_graph(graph: SwitchingGraph, path: str | Path) -> None:
     graph : SwitchingGraph
     path : path-like
     """
+    write_atomically(path, graph_to_bytes(graph))
+
+
+def graph_to_bytes(graph: SwitchingGraph) -> bytes:
+    """Return the content of a graph file."""
     polygon = graph.polygon
     header = {
         "format": FORMAT,
@@ -77,12 +82,11 @@ def save_graph(graph: SwitchingGraph, path: str | Path) -> None:
         arrays[f"{family.kind}.margins"] = family.margins
         arrays[f"{family.kind}.witnesses"] = family.witnesses
     if isinstance(graph.switches, StoredSwitches):
-        arrays["switches.starts"] = graph.switches.starts
-        arrays["switches.others"] = graph.switches.others
-        arrays["switches.held"] = graph.switches.held
+        for name in SWITCH_ARRAYS:
+            arrays[f"switches.{name}"] = getattr(graph.switches, name)
     buffer = io.BytesIO()
     np.savez_compressed(buffer, **arrays)  # type: ignore[arg-type]
-    write_atomically(path, buffer.getvalue())
+    return buffer.getvalue()
 
 
 def load_graph(path: str | Path) -> SwitchingGraph:
@@ -106,6 +110,31 @@ def load_graph(path: str | Path) -> SwitchingGraph:
         content = Path(path).read_bytes()
     except OSError as error:
         raise FileFormatError(f"{path}: cannot be read: {error}") from error
+    return graph_from_bytes(content, path)
+
+
+def graph_from_bytes(
+    content: bytes, path: str | Path = "graph", polygon: Polygon | None = None
+) -> SwitchingGraph:
+    """Return the graph that `graph_to_bytes` made bytes of.
+
+    Parameters
+    ----------
+    content : bytes
+    path : path-like
+        Where it is from, for messages.
+    polygon : Polygon, optional
+        The object, if it is at hand: it is not made again, and knows the edges of its input.
+
+    Returns
+    -------
+    SwitchingGraph
+
+    Raises
+    ------
+    FileFormatError
+        As `load_graph`.
+    """
     try:
         if not zipfile.is_zipfile(io.BytesIO(content)):
             raise ValueError("it is no .npz archive")
@@ -122,15 +151,18 @@ def load_graph(path: str | Path) -> SwitchingGraph:
             f"version {VERSION}: build the graph again"
         )
     try:
-        return _graph(header, arrays)
+        return _graph(header, arrays, polygon)
     except (KeyError, ValueError, TypeError, IndexError, RegraspError) as error:
         raise FileFormatError(f"{path}: damaged: {error!r}") from error
 
 
-def _graph(header: dict[str, Any], arrays: dict[str, np.ndarray]) -> SwitchingGraph:
+def _graph(
+    header: dict[str, Any], arrays: dict[str, np.ndarray], polygon: Polygon | None
+) -> SwitchingGraph:
     _check_names(set(arrays), kinds_of(header["options"]["sets"]), header["stored"])
-    rings = np.split(arrays["vertices"], np.cumsum(arrays["ring_sizes"])[:-1])
-    polygon = Polygon(rings[0], rings[1:], header["name"])
+    if polygon is None:
+        rings = np.split(arrays["vertices"], np.cumsum(arrays["ring_sizes"])[:-1])
+        polygon = Polygon(rings[0], rings[1:], header["name"])
     cones = Cones.of(polygon, arrays["friction"])
     options = GraphOptions(**header["options"])
     get_solver(options.solver)
@@ -146,7 +178,7 @@ def _graph(header: dict[str, Any], arrays: dict[str, np.ndarray]) -> SwitchingGr
     switches: Switches
     if header["stored"]:
         switches = _stored(
-            len(sets), *(arrays[f"switches.{n}"] for n in ("starts", "others", "held"))
+            len(sets), StoredSwitches(*(arrays[f"switches.{name}"] for name in SWITCH_ARRAYS))
         )
     else:
         rule = switch_rule(
@@ -164,7 +196,7 @@ def _graph(header: dict[str, Any], arrays: dict[str, np.ndarray]) -> SwitchingGr
 def _check_names(names: set[str], kinds: tuple[str, ...], stored: bool) -> None:
     expected = {"header", "ring_sizes", "vertices", "friction"}
     expected |= {f"{k}.{n}" for k in kinds for n in ("edges", "centers", "margins", "witnesses")}
-    expected |= {f"switches.{n}" for n in ("starts", "others", "held") if stored}
+    expected |= {f"switches.{n}" for n in SWITCH_ARRAYS if stored}
     if names != expected:
         raise ValueError(f"unknown or missing arrays: {sorted(names ^ expected)}")
 
@@ -191,15 +223,22 @@ def _family(cones: Cones, kind: str, candidates: int, arrays: dict[str, np.ndarr
     return Family(kind, functions, centers, margins, witnesses, int(candidates))
 
 
-def _stored(n: int, starts: np.ndarray, others: np.ndarray, held: np.ndarray) -> StoredSwitches:
+def _stored(n: int, stored: StoredSwitches) -> StoredSwitches:
+    starts, others, held = stored.starts, stored.others, stored.held
+    pairs, width = len(others) // 2, stored.slots.shape[1]
     if not (
         starts.shape == (n + 1,)
         and others.shape == held.shape == (int(starts[-1]),)
+        and stored.slots.shape == stored.points.shape == (pairs, width)
+        and 2 * pairs == len(others)
         and (np.diff(starts) >= 0).all()
         and starts[0] == 0
         and ((others >= 0) & (others < n)).all()
-        and ((held >= 1) & (held <= 3)).all()
+        and ((held >= 1) & (held <= width)).all()
+        and ((stored.slots >= -1) & (stored.slots < 3)).all()
+        and np.array_equal(stored.slots < 0, np.isnan(stored.points))
+        and not ((stored.points < 0) | (stored.points > 1)).any()
         and starts.dtype.kind == others.dtype.kind == held.dtype.kind == "i"
     ):
         raise ValueError("the arrays of the switches do not fit together")
-    return StoredSwitches(starts, others, held)
+    return stored

@@ -7,13 +7,13 @@ from dataclasses import dataclass
 import numpy as np
 
 from regrasp_lp.contact import Grasp
-from regrasp_lp.friction import BoolArray, FloatArray, IntArray
+from regrasp_lp.contact_rule import meet_held
+from regrasp_lp.friction import FloatArray, IntArray
 from regrasp_lp.grasp_sets.collection import GraspSets
 from regrasp_lp.grasp_sets.pieces import BARELY_APART
 from regrasp_lp.joins import best_joins
 from regrasp_lp.lp import GAP, Solver
 from regrasp_lp.shadows import Shadows, shadows
-from regrasp_lp.switching import can_switch
 
 
 @dataclass(frozen=True, eq=False)
@@ -95,8 +95,7 @@ def handovers(
     ----------
     sets : GraspSets
     solver : Solver
-        Finds margins and witnesses; what is feasible is decided exactly (with three held
-        contacts: by the margin LP).
+        Finds margins and witnesses; what is feasible is decided exactly.
     first, second : int
         Numbers of the two sets.
     held : int
@@ -118,7 +117,7 @@ def handovers(
     i, j = np.nonzero((one.edges[:, None, :] == other.edges[None, :, :]).all(axis=2))
     one, other = one.take(i), other.take(j)
     joins = best_joins(one, other, solver, apart=BARELY_APART)
-    feasible = decide_held(one, other, solver)
+    feasible = meet_held(one, other, solver=solver).exist
     if feasible.any() and not np.isfinite(joins.margins[feasible]).any():
         # It exists, but within rounding: the nearest grasps are the best that can be said.
         least = -GAP * sets.sources[0].cones.size
@@ -136,13 +135,6 @@ def handovers(
     # What exists is decided without regard to the order of two contacts on one edge; a choice of
     # slots that exists in the other order only has a negative margin here.
     return [h for h in found if h.margin > 0] or found[:1]
-
-
-def decide_held(first: Shadows, second: Shadows, solver: Solver) -> BoolArray:
-    """Whether aligned projections have a common point: exactly, or by LP if three are held."""
-    if first.held < 3:
-        return can_switch(first, second)
-    return best_joins(first, second, solver, enough=0.0).exist
 
 
 def _projections(sets: GraspSets, index: int, held: int) -> Shadows:

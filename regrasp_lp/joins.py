@@ -30,13 +30,17 @@ class Joins:
     ----------
     margins : numpy.ndarray, shape (P,)
         Largest margin over all pairs of pieces; -inf if no two pieces can be joined.
+    bounds : numpy.ndarray, shape (P,)
+        Upper bounds of these margins, from the multipliers of the programs and from `least`; none
+        where the search ended with `enough`.
     exist : numpy.ndarray of bool, shape (P,)
-        Whether it is positive beyond the accuracy of the solver.
+        Whether the margin is positive beyond the accuracy of the solver.
     first, second : numpy.ndarray, shape (P, 3)
         Fractions of the two grasps (NaN beyond their number of contacts).
     """
 
     margins: FloatArray
+    bounds: FloatArray
     exist: BoolArray
     first: FloatArray
     second: FloatArray
@@ -72,6 +76,7 @@ def best_joins(
     n = len(first)
     joins = Joins(
         np.full(n, -np.inf),
+        np.full(n, least),
         np.zeros(n, dtype=bool),
         np.full((n, 3), np.nan),
         np.full((n, 3), np.nan),
@@ -83,6 +88,32 @@ def best_joins(
         group_ = _Group.of(first.take(rows), second.take(rows), apart, least)
         _solve_group(group_, rows, joins, solver, enough)
     return joins
+
+
+def possible_joins(first: Shadows, second: Shadows, solver: Solver, least: float) -> IntArray:
+    """Return the joins of pieces of one pair of sets whose margin may be `least` or more.
+
+    Parameters
+    ----------
+    first, second : Shadows
+        One projection each.
+    solver : Solver
+        Its multipliers give an upper bound for each join.
+    least : float
+
+    Returns
+    -------
+    numpy.ndarray of int, shape (K, 4)
+        The functions j, k of the first set and j, k of the second one; most promising first.
+    """
+    group = _Group.of(first, second, 0.0, least)
+    rows, bound = group.candidates()
+    rows = rows[bound >= least]
+    if not rows.size:
+        return rows[:, 1:]
+    solution = maximise_margins(group.joined(rows), solver)
+    order = np.argsort(-solution.margins, kind="stable")
+    return rows[order[solution.bounds[order] >= least], 1:]
 
 
 @dataclass(frozen=True, eq=False)
@@ -152,6 +183,7 @@ def _solve_group(
         order = np.lexsort((-solution.margins, rows[now, 0]))
         pairs, first = np.unique(rows[now][order, 0], return_index=True)
         best, place = order[first], index[pairs]
+        np.maximum.at(joins.bounds, index[rows[now, 0]], solution.bounds)
         better = solution.margins[best] > joins.margins[place]
         best, place = best[better], place[better]
         joins.margins[place] = solution.margins[best]

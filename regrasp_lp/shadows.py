@@ -19,8 +19,13 @@ from itertools import combinations
 import numpy as np
 from numpy.typing import NDArray
 
-from regrasp_lp.friction import BoolArray, FloatArray, IntArray
+from regrasp_lp.friction import UNIT_ROUNDOFF, BoolArray, FloatArray, IntArray
 from regrasp_lp.torque import TorqueFunctions
+
+GRID = np.linspace(0.0, 1.0, 9)
+"""Positions of the first of two held contacts at which `Shadows.on_grid` looks."""
+
+_QUOTIENT = 8 * UNIT_ROUNDOFF
 
 
 @dataclass(frozen=True, eq=False)
@@ -84,6 +89,48 @@ class Shadows:
             self.valid[rows],
         )
 
+    def limits(
+        self, x: FloatArray | float = 0.0, *, inner: bool = True
+    ) -> tuple[FloatArray, FloatArray]:
+        """Return bounds of the interval (υ, δ) in which the last held contact may be.
+
+        δ is ``max_j root_j`` of the functions with the others at 0, υ is ``min_k root_k`` of those
+        with the others at 1.
+
+        Parameters
+        ----------
+        x : numpy.ndarray, shape (R,), or float
+            Position of the first of two held contacts; without effect on one held contact.
+        inner : bool
+            Whether what lies between the bounds is inside for certain (υ rounded up, δ down),
+            or else what lies beyond them is outside for certain.
+
+        Returns
+        -------
+        upsilon, delta : numpy.ndarray, shape (R,)
+        """
+        sign = 1.0 if inner else -1.0
+        # twice the error of a value anywhere in the box, and of the quotient
+        slack = (2 * sign) * self.errors
+        moved = 0.0 if self.held == 1 else self.slopes[:, :, 0] * np.reshape(x, (-1, 1))
+        slope = self.slopes[:, :, -1]
+        rises = slope > 0
+        below, above = self.low + moved + slack, self.high + moved - slack
+        root = np.divide(-below, slope, out=np.where(below < 0, np.inf, -np.inf), where=rises)
+        root = np.where(self.valid, root, -np.inf).max(axis=1)
+        delta = root - _QUOTIENT * sign * np.abs(np.where(np.isfinite(root), root, 0.0))
+        root = np.divide(-above, slope, out=np.where(above > 0, -np.inf, np.inf), where=rises)
+        root = np.where(self.valid, root, np.inf).min(axis=1)
+        upsilon = root + _QUOTIENT * sign * np.abs(np.where(np.isfinite(root), root, 0.0))
+        return np.asarray(upsilon), np.asarray(delta)
+
+    @cached_property
+    def on_grid(self) -> tuple[FloatArray, FloatArray]:
+        """Inner `limits` with the first of two held contacts on `GRID`, (R, 9) each."""
+        columns = [self.limits(x) for x in (GRID if self.held > 1 else GRID[:1])]
+        lower, upper = (np.stack(end, axis=1) for end in zip(*columns, strict=True))
+        return lower, upper
+
     def exact(self, index: int) -> tuple[list[list[Fraction]], list[list[Fraction]]]:
         """Return one projection in rational numbers.
 
@@ -144,6 +191,24 @@ def shadows(
             parts.append(_project(functions, number, chosen[~again], slots, width))
     arrays = [np.concatenate(columns) for columns in zip(*parts, strict=True)]
     return Shadows(tuple(sources), *arrays)
+
+
+def first_places(held: Sequence[int], edges: Sequence[int]) -> list[int]:
+    """Return which contacts of a set are held: on every edge the first ones.
+
+    Parameters
+    ----------
+    held : sequence of int
+        Edges of the held contacts, ascending.
+    edges : sequence of int
+        Edges of the contacts of the set, ascending.
+
+    Examples
+    --------
+    >>> first_places((3, 5), (3, 3, 5))
+    [0, 2]
+    """
+    return [edges.index(e) + held[:i].count(e) for i, e in enumerate(held)]
 
 
 def _project(

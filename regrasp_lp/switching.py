@@ -17,141 +17,175 @@ is decided in rational numbers.
 from __future__ import annotations
 
 from collections.abc import Iterable
+from dataclasses import dataclass
 from fractions import Fraction
 from itertools import pairwise
 
 import numpy as np
 
 from regrasp_lp.errors import OptionError
-from regrasp_lp.friction import UNIT_ROUNDOFF, BoolArray, FloatArray
-from regrasp_lp.shadows import Shadows
+from regrasp_lp.friction import UNIT_ROUNDOFF, BoolArray, FloatArray, IntArray
+from regrasp_lp.shadows import GRID, Shadows
 
 _CHUNK = 50_000
-_GRID = np.linspace(0.0, 1.0, 9)
+
+Interval = tuple[Fraction, Fraction]
+ExactShadow = tuple[list[list[Fraction]], list[list[Fraction]]]
+
+REASONS = ("d0<=u1", "d1<=u0", "d0<=0", "u0>=1", "d1<=0", "u1>=1")
+"""Why a position of the held contacts is bad, in the order in which bad intervals are listed: δ
+and υ of the first set (0) and of the second one (1)."""
 
 
-def can_switch(first: Shadows, second: Shadows) -> BoolArray:
-    """Whether projections on the same held contacts have a common point, exactly.
+@dataclass(frozen=True, eq=False)
+class Meeting:
+    """Whether aligned projections have a common point, and which.
+
+    Parameters
+    ----------
+    exist : numpy.ndarray of bool, shape (P,)
+    points : numpy.ndarray, shape (P, h)
+        Fractions of the held contacts at such a point; NaN where there is none. Where no double
+        is inside, the nearest ones.
+    exactly : numpy.ndarray of bool, shape (P,)
+        Which were left open by floating point, and decided in rational numbers.
+    """
+
+    exist: BoolArray
+    points: FloatArray
+    exactly: BoolArray
+
+    @classmethod
+    def unknown(cls, count: int, held: int) -> Meeting:
+        """Return arrays to be filled in: no pair has a common point."""
+        none = np.zeros(count, dtype=bool)
+        return cls(none, np.full((count, held), np.nan), none.copy())
+
+    def write(self, rows: IntArray, found: Meeting) -> None:
+        """Fill in some of the pairs."""
+        self.exist[rows], self.points[rows] = found.exist, found.points
+        self.exactly[rows] = found.exactly
+
+
+def meet(
+    first: Shadows, second: Shadows, i: IntArray | None = None, j: IntArray | None = None
+) -> Meeting:
+    """Decide whether projections on the same held contacts have a common point, exactly.
 
     Parameters
     ----------
     first, second : Shadows
-        Aligned: pair i is ``first[i]`` and ``second[i]``, held on the same edges in the same
-        order; one or two held contacts.
+        Pair n is ``first[i[n]]`` and ``second[j[n]]``, held on the same edges in the same order;
+        one or two held contacts.
+    i, j : numpy.ndarray of int, shape (P,), optional
+        All in order by default: the two are aligned.
 
     Returns
     -------
-    numpy.ndarray of bool, shape (P,)
+    Meeting
 
     Raises
     ------
     OptionError
-        If more contacts are held: there is no closed form, only a margin LP.
+        If more contacts are held: see `contact_rule.meet_held`.
     """
-    if first.held > 2 and len(first) > 0:
-        raise OptionError(f"{first.held} held contacts: decide by `handovers.decide_held`")
+    i = np.arange(len(first)) if i is None else i
+    j = np.arange(len(second)) if j is None else j
+    if first.held > 2 and len(i) > 0:
+        raise OptionError(f"{first.held} held contacts: decide by `contact_rule.meet_held`")
+    result = Meeting.unknown(len(i), first.held)
     decide = _one_held if first.held == 1 else _two_held
-    parts = [
-        decide(*(s.take(np.arange(i, min(i + _CHUNK, len(first)))) for s in (first, second)))
-        for i in range(0, len(first), _CHUNK)
-    ]
-    return np.concatenate(parts) if parts else np.zeros(0, dtype=bool)
-
-
-def _one_held(first: Shadows, second: Shadows) -> BoolArray:
-    """Intervals with error bounds on both sides; exact where they do not decide."""
-    inner, outer = (
-        (
-            np.maximum(*(_upsilon(s, sign) for s in (first, second))),
-            np.minimum(*(_delta(s, sign) for s in (first, second))),
-        )
-        for sign in (1.0, -1.0)
-    )
-    yes, possible = ((u < d) & (u < 1) & (d > 0) for u, d in (inner, outer))
-    for i in np.flatnonzero(possible & ~yes).tolist():
-        yes[i] = _exact_one_held(first.exact(i), second.exact(i))
-    return np.asarray(yes)
-
-
-def _delta(shadow: Shadows, sign: float) -> FloatArray:
-    """Lower (sign 1) or upper (sign -1) bound of δ: the greatest root of the functions of D."""
-    a = shadow.slopes[:, :, 0]
-    value = -(shadow.low + 2 * sign * shadow.errors)
-    root = np.divide(value, a, out=np.where(value > 0, np.inf, -np.inf), where=a > 0)
-    root = root - sign * 8 * UNIT_ROUNDOFF * np.where(np.isfinite(root), np.abs(root), 0.0)
-    return np.asarray(np.where(shadow.valid, root, -np.inf).max(axis=1))
-
-
-def _upsilon(shadow: Shadows, sign: float) -> FloatArray:
-    """Upper (sign 1) or lower (sign -1) bound of υ: the least root of the functions of U."""
-    a = shadow.slopes[:, :, 0]
-    value = -(shadow.high - 2 * sign * shadow.errors)
-    root = np.divide(value, a, out=np.where(value < 0, -np.inf, np.inf), where=a > 0)
-    root = root + sign * 8 * UNIT_ROUNDOFF * np.where(np.isfinite(root), np.abs(root), 0.0)
-    return np.asarray(np.where(shadow.valid, root, np.inf).min(axis=1))
-
-
-def _two_held(first: Shadows, second: Shadows) -> BoolArray:
-    both = (first, second)
-    n = len(first)
-    # A few positions of the first held contact, and the middle for the second, prove most.
-    gap, y = np.full((n, len(_GRID)), -np.inf), np.zeros((n, len(_GRID)))
-    for column, x in enumerate(_GRID):
-        low, high = _allowed(both, np.full(n, x))
-        gap[:, column], y[:, column] = high - low, (low + high) / 2
-    best, every = gap.argmax(axis=1), np.arange(n)
-    yes = _proves(both, _GRID[best], y[every, best])
-    open_ = np.flatnonzero(~yes)
-    if not open_.size:
-        return yes
-    both = (first.take(open_), second.take(open_))
-    bad = _bad_intervals(both)
-    covered = _covered(bad)
-    found = np.zeros(len(open_), dtype=bool)
-    for x in _gaps(_bad_intervals(both, tighten=False)):
-        rest = np.flatnonzero(~covered & ~found)
-        here = (both[0].take(rest), both[1].take(rest))
-        low, high = _allowed(here, x[rest])
-        found[rest] = _proves(here, x[rest], (low + high) / 2)
-    for i in np.flatnonzero(~covered & ~found).tolist():
-        found[i] = _exact_two_held(both[0].exact(i), both[1].exact(i))
-    yes[open_] = found
-    return yes
-
-
-def _allowed(both: tuple[Shadows, Shadows], x: FloatArray) -> tuple[FloatArray, FloatArray]:
-    """The allowed interval of the second held contact at position x of the first, in [0, 1]."""
-    low, high = np.zeros(len(x)), np.ones(len(x))
-    for shadow in both:
-        a, b = shadow.slopes[:, :, 0], shadow.slopes[:, :, 1]
-        below = -(shadow.low + a * x[:, None])
-        root = np.divide(below, b, out=np.where(below > 0, np.inf, -np.inf), where=b > 0)
-        high = np.minimum(high, np.where(shadow.valid, root, -np.inf).max(axis=1))
-        above = -(shadow.high + a * x[:, None])
-        root = np.divide(above, b, out=np.where(above < 0, -np.inf, np.inf), where=b > 0)
-        low = np.maximum(low, np.where(shadow.valid, root, np.inf).min(axis=1))
-    return np.maximum(low, -1.0), np.minimum(np.maximum(high, -1.0), 2.0)
-
-
-def _proves(both: tuple[Shadows, Shadows], x: FloatArray, y: FloatArray) -> BoolArray:
-    """Whether the point (x, y) is in both projections, beyond rounding."""
-    x, y = np.clip(x, 0, 1), np.clip(y, 0, 1)
-    result = np.ones(len(x), dtype=bool)
-    for shadow in both:
-        moved = shadow.slopes[:, :, 0] * x[:, None] + shadow.slopes[:, :, 1] * y[:, None]
-        below = shadow.low + moved + shadow.errors < 0
-        above = shadow.high + moved - shadow.errors > 0
-        result &= (shadow.valid & below).any(axis=1) & (shadow.valid & above).any(axis=1)
+    for start in range(0, len(i), _CHUNK):
+        rows = np.arange(start, min(start + _CHUNK, len(i)))
+        open_ = rows[_seen(first, second, i[rows], j[rows], rows, result)]
+        if open_.size:
+            result.write(open_, decide(first.take(i[open_]), second.take(j[open_])))
     return result
 
 
-def _bad_intervals(
+def can_switch(first: Shadows, second: Shadows) -> BoolArray:
+    """Whether aligned projections on the same held contacts have a common point, exactly."""
+    return meet(first, second).exist
+
+
+def _seen(
+    first: Shadows, second: Shadows, i: IntArray, j: IntArray, rows: IntArray, result: Meeting
+) -> IntArray:
+    """Write the pairs that meet at a few positions of the first contact; return the others."""
+    (low, high), (other_low, other_high) = first.on_grid, second.on_grid
+    low, high = np.maximum(low[i], other_low[j]), np.minimum(high[i], other_high[j])
+    width = np.minimum(high, 1.0) - np.maximum(low, 0.0)
+    every, best = np.arange(len(i)), width.argmax(axis=1)
+    yes, middle = _between(low[every, best], high[every, best])
+    result.exist[rows] = yes
+    points = np.stack((GRID[best], middle), axis=1)[:, -first.held :]
+    result.points[rows[yes]] = points[yes]
+    return np.flatnonzero(~yes)
+
+
+def _between(low: FloatArray, high: FloatArray) -> tuple[BoolArray, FloatArray]:
+    """Whether there is a double between bounds and in [0, 1], and one: a proof."""
+    low, high = np.clip(low, 0.0, 2.0), np.clip(high, -1.0, 1.0)
+    middle = (low + high) / 2
+    return (low < middle) & (middle < high), middle
+
+
+def _one_held(first: Shadows, second: Shadows) -> Meeting:
+    """Pairs whose intervals do not meet for certain; in rational numbers if not even that."""
+    result = Meeting.unknown(len(first), 1)
+    certain = one_held_reasons(first, second).any(axis=1)
+    for n in np.flatnonzero(~certain).tolist():
+        _write_exact(result, n, exact_one_held(first.exact(n), second.exact(n)))
+    return result
+
+
+def one_held_reasons(first: Shadows, second: Shadows) -> BoolArray:
+    """Which of `REASONS` certainly keep aligned projections on one contact apart, (P, 6)."""
+    (u0, d0), (u1, d1) = (s.limits(inner=False) for s in (first, second))
+    real = (d0 < np.inf) & (u1 > -np.inf), (d1 < np.inf) & (u0 > -np.inf)
+    reasons = ((d0 <= u1) & real[0], (d1 <= u0) & real[1], d0 <= 0, u0 >= 1, d1 <= 0, u1 >= 1)
+    return np.stack(reasons, axis=1)
+
+
+def _two_held(first: Shadows, second: Shadows) -> Meeting:
+    both = (first, second)
+    result = Meeting.unknown(len(first), 2)
+    covered = _covered(bad_intervals(both))
+    for x in _gaps(bad_intervals(both, tighten=False)):
+        rest = np.flatnonzero(~covered & ~result.exist)
+        (low, high), (other_low, other_high) = (s.take(rest).limits(x[rest]) for s in both)
+        yes, middle = _between(np.maximum(low, other_low), np.minimum(high, other_high))
+        result.exist[rest] = yes
+        result.points[rest[yes]] = np.stack((x[rest], middle), axis=1)[yes]
+    for n in np.flatnonzero(~covered & ~result.exist).tolist():
+        _write_exact(result, n, exact_two_held(first.exact(n), second.exact(n)))
+    return result
+
+
+def _write_exact(result: Meeting, n: int, point: tuple[Fraction, ...] | None) -> None:
+    result.exactly[n] = True
+    result.exist[n] = point is not None
+    if point is not None:
+        result.points[n] = [float(x) for x in point]
+
+
+def bad_intervals(
     both: tuple[Shadows, Shadows], tighten: bool = True
 ) -> tuple[FloatArray, FloatArray]:
-    """The bad intervals of x, shape (P, 6) each end; empty ones have their ends exchanged.
+    """Return the bad intervals of x, shape (P, 6) each end; empty ones have their ends exchanged.
 
-    With `tighten`, every inequality is made stricter by its rounding error, so that what is
-    called bad is bad.
+    Parameters
+    ----------
+    both : tuple of two Shadows
+        Aligned, on two held contacts.
+    tighten : bool
+        Whether every inequality is made stricter by its rounding error, so that what is called
+        bad is bad.
+
+    Returns
+    -------
+    lower, upper : numpy.ndarray, shape (P, 6)
+        One column for each of `REASONS`.
     """
     factor = 1.0 if tighten else 0.0
     first, second = both
@@ -179,8 +213,8 @@ def _root_order(s: Shadows, t: Shadows, factor: float) -> tuple[FloatArray, Floa
     constant = low * b_k - high * b_j - factor * error
     slope = a_j * b_k - a_k * b_j
     depend = (b_j > 0) & (b_k > 0) & s.valid[:, :, None] & t.valid[:, None, :]
-    n = len(s)
-    pairs = _half_lines(constant.reshape(n, -1), slope.reshape(n, -1), depend.reshape(n, -1))
+    flat = (len(s), low.shape[1] * high.shape[2])
+    pairs = _half_lines(constant.reshape(flat), slope.reshape(flat), depend.reshape(flat))
     fixed_j = s.valid & (s.slopes[:, :, 1] == 0)
     fixed_k = t.valid & (t.slopes[:, :, 1] == 0)
     error_j, error_k = 4 * factor * s.errors, 4 * factor * t.errors
@@ -231,48 +265,81 @@ def _gaps(intervals: tuple[FloatArray, FloatArray]) -> list[FloatArray]:
     return [points[:, i] for i in range(3)]
 
 
-ExactShadow = tuple[list[list[Fraction]], list[list[Fraction]]]
+def exact_one_held(*both: ExactShadow) -> tuple[Fraction] | None:
+    """Return the middle of the interval in which one contact can be held, None if empty."""
+    delta = min(_exact_delta(below) for below, _ in both)
+    upsilon = max(_exact_upsilon(above) for _, above in both)
+    if upsilon < delta and upsilon < 1 and delta > 0:
+        return ((max(upsilon, Fraction(0)) + min(delta, Fraction(1))) / 2,)
+    return None
 
 
-def _exact_one_held(*both: ExactShadow) -> bool:
-    always, never = Fraction(2), Fraction(-1)
-    delta = min(
-        max((always if c < 0 else never) if a == 0 else -c / a for c, a in below)
-        for below, _ in both
-    )
-    upsilon = max(
-        min((-always if c > 0 else always) if a == 0 else -c / a for c, a in above)
-        for _, above in both
-    )
-    return upsilon < delta and upsilon < 1 and delta > 0
+def exact_one_held_reason(first: ExactShadow, second: ExactShadow) -> str | None:
+    """Return one of `REASONS` that keeps projections on one contact apart, if there is any."""
+    d0, d1 = (_exact_delta(below) for below, _ in (first, second))
+    u0, u1 = (_exact_upsilon(above) for _, above in (first, second))
+    # Where some function is constant a bound stands for an infinite one; then one of the last
+    # four holds, which are looked at first.
+    holds = (d0 <= u1, d1 <= u0, d0 <= 0, u0 >= 1, d1 <= 0, u1 >= 1)
+    reasons = [why for why, true in zip(REASONS, holds, strict=True) if true]
+    return reasons[-1] if reasons else None
 
 
-def _exact_two_held(*both: ExactShadow) -> bool:
-    """Whether the bad intervals, in rational numbers, leave a point of [0, 1] free."""
+_ALWAYS, _NEVER = Fraction(2), Fraction(-1)  # beyond the edge [0, 1] on either side
+
+
+def _exact_delta(below: list[list[Fraction]]) -> Fraction:
+    """Greatest root of the functions of D, in one contact."""
+    return max((_ALWAYS if c < 0 else _NEVER) if a == 0 else -c / a for c, a in below)
+
+
+def _exact_upsilon(above: list[list[Fraction]]) -> Fraction:
+    """Least root of the functions of U, in one contact."""
+    return min((_NEVER if c > 0 else _ALWAYS) if a == 0 else -c / a for c, a in above)
+
+
+def exact_two_held(*both: ExactShadow) -> tuple[Fraction, Fraction] | None:
+    """Return a position of two held contacts that both sets allow, None if there is none."""
+    bad = [interval for interval in exact_bad_intervals(*both) if interval is not None]
+    ends = sorted({Fraction(0), Fraction(1), *(end for interval in bad for end in interval)})
+    points = [(p + q) / 2 for p, q in pairwise(ends)] + [Fraction(0), Fraction(1)]
+    for x in points:
+        if not any(low <= x <= high for low, high in bad):
+            y = exact_one_held(*(_slice(shadow, x) for shadow in both))
+            if y is not None:
+                return x, *y
+    return None
+
+
+def _slice(shadow: ExactShadow, x: Fraction) -> ExactShadow:
+    """The projection on the second held contact, with the first at x."""
+    below, above = ([[c + a * x, b] for c, a, b in functions] for functions in shadow)
+    return below, above
+
+
+def exact_bad_intervals(*both: ExactShadow) -> list[Interval | None]:
+    """Return the bad intervals of x in rational numbers, one for each of `REASONS`."""
     intervals = []
-    for (below, above), (_, other_above) in (both, both[::-1]):
-        intervals.append(_exact_half_lines((c, a) for c, a, _ in below))
-        intervals.append(_exact_half_lines((-(c + b), -a) for c, a, b in above))
+    for (below, _), (_, above) in (both, both[::-1]):
         conditions = [(c, a) for c, a, b in below if b == 0]
-        conditions += [(-c, -a) for c, a, b in other_above if b == 0]
+        conditions += [(-c, -a) for c, a, b in above if b == 0]
         conditions += [
             (c * b_k - c_k * b, a * b_k - a_k * b)
             for c, a, b in below
             if b > 0
-            for c_k, a_k, b_k in other_above
+            for c_k, a_k, b_k in above
             if b_k > 0
         ]
         intervals.append(_exact_half_lines(conditions))
-    bad = [interval for interval in intervals if interval is not None]
-    ends = sorted({Fraction(0), Fraction(1), *(end for interval in bad for end in interval)})
-    points = [Fraction(0), Fraction(1)]
-    points += [(p + q) / 2 for p, q in pairwise(ends)]
-    return any(not any(low <= x <= high for low, high in bad) for x in points)
+    for below, above in both:
+        intervals.append(_exact_half_lines((c, a) for c, a, _ in below))
+        intervals.append(_exact_half_lines((-(c + b), -a) for c, a, b in above))
+    return intervals
 
 
 def _exact_half_lines(
     conditions: Iterable[tuple[Fraction, Fraction]],
-) -> tuple[Fraction, Fraction] | None:
+) -> Interval | None:
     """The part of [0, 1] where ``constant + slope x >= 0`` throughout; None if empty."""
     lower, upper = Fraction(0), Fraction(1)
     for constant, slope in conditions:

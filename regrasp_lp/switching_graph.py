@@ -4,15 +4,16 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
-from functools import cached_property
-from itertools import chain
+from functools import cached_property, partial
 from pathlib import Path
 from typing import TYPE_CHECKING
 
 import numpy as np
 
+from regrasp_lp.completion import complete
+from regrasp_lp.contact import Grasp
 from regrasp_lp.errors import NoPlanFound
-from regrasp_lp.friction import Cones, FloatArray, IntArray
+from regrasp_lp.friction import Cones, FloatArray
 from regrasp_lp.grasp_sets.collection import GraspSets
 from regrasp_lp.handovers import Switch, handovers
 from regrasp_lp.lp import Solver, get_solver
@@ -26,8 +27,11 @@ from regrasp_lp.planning.planner import (
     checked_grasp,
 )
 from regrasp_lp.polygon import Polygon
+from regrasp_lp.shadows import first_places
+from regrasp_lp.structure import Structure, structure
 from regrasp_lp.summary import KindCounts, Summary
 from regrasp_lp.switches import (
+    SWITCH_ARRAYS,
     StoredSwitches,
     Switches,
     SwitchesOnDemand,
@@ -37,6 +41,8 @@ if TYPE_CHECKING:
     import networkx as nx
 
 Progress = Callable[[str, int, int], None]
+
+_equal = partial(np.array_equal, equal_nan=True)
 
 
 @dataclass(frozen=True)
@@ -101,7 +107,7 @@ class SwitchingGraph:
             and [f.kind for f in self.sets.families] == [f.kind for f in other.sets.families]
         )
         mine, theirs = self._arrays(), other._arrays()
-        return same and len(mine) == len(theirs) and all(map(np.array_equal, mine, theirs))
+        return same and len(mine) == len(theirs) and all(map(_equal, mine, theirs))
 
     __hash__ = None  # type: ignore[assignment]
 
@@ -110,8 +116,14 @@ class SwitchingGraph:
         for family in self.sets.families:
             arrays += [family.functions.edges, family.centers, family.margins, family.witnesses]
         if isinstance(self.switches, StoredSwitches):
-            arrays += [self.switches.starts, self.switches.others, self.switches.held]
+            arrays += [getattr(self.switches, name) for name in SWITCH_ARRAYS]
         return arrays
+
+    def __reduce__(self) -> tuple[Callable[..., SwitchingGraph], tuple[object, ...]]:
+        """Pickle what a file holds: small, and also if switches are found on demand."""
+        from regrasp_lp.graph_file import graph_from_bytes, graph_to_bytes
+
+        return graph_from_bytes, (graph_to_bytes(self), "pickle", self.polygon)
 
     def __repr__(self) -> str:
         return f"<SwitchingGraph of {self.polygon.name!r}: {len(self)} {self.options.sets} sets>"
@@ -184,6 +196,40 @@ class SwitchingGraph:
             tuple(found),
         )
 
+    def witness(self, first: int, second: int) -> tuple[Grasp, Grasp] | None:
+        """Return two grasps that prove a switch, or None if there is none. No program is solved.
+
+        Parameters
+        ----------
+        first, second : int
+            Numbers of sets.
+
+        Returns
+        -------
+        tuple of Grasp or None
+            One in each set, equal in as many contacts as the switch can hold. `switch` finds
+            those with the largest margin.
+
+        Raises
+        ------
+        IndexError
+            If there is no such set.
+        """
+        if self.held(first, second) is None:
+            return None
+        low, high = sorted((first, second))
+        found = self.switches.witness(low, high)
+        slots, points = found or (np.zeros(0, dtype=np.int8), np.zeros(0))
+        edges = self.sets[low].edges
+        grasps = {}
+        for index in (low, high):
+            family, row = self.sets.place(index)
+            functions = self.sets.families[family].functions.take(np.array([row]))
+            there = first_places([edges[s] for s in slots], self.sets[index].edges)
+            fractions = complete(functions, np.array([there]), points[None, :])
+            grasps[index] = self.sets.grasp(index, fractions[0])
+        return grasps[first], grasps[second]
+
     def neighbors(self, index: int) -> list[int]:
         """Return the numbers of all adjacent sets, ascending.
 
@@ -207,62 +253,24 @@ class SwitchingGraph:
         return found
 
     @cached_property
-    def _structure(self) -> tuple[IntArray, IntArray, int]:
-        """Component of each set, in the graph and among the sets of its kind; n_switches."""
-        from scipy import sparse
-        from scipy.sparse import csgraph
-
-        n, contacts = len(self), self.sets.contacts
-        kinds = np.arange(len(self.sets.families)).repeat(np.diff(self.sets.offsets))
-        need = self.hand.needs
-
-        def united(labels: IntArray, i: IntArray, j: IntArray) -> IntArray:
-            one, other = labels[i], labels[j]
-            apart = one != other
-            pairs = (np.ones(apart.sum()), (one[apart], other[apart]))
-            graph = sparse.coo_matrix(pairs, shape=(n, n))
-            return np.asarray(csgraph.connected_components(graph, directed=False)[1][labels])
-
-        count, joins = 0, []
-        for a, b in ((2, 2), (2, 3), (3, 3)):
-            one, other = np.flatnonzero(contacts == a), np.flatnonzero(contacts == b)
-            if need[a, b] or not one.size or not other.size:
-                continue
-            if a == b:
-                count += len(one) * (len(one) - 1) // 2
-                joins.append((one[:-1], one[1:]))
-            else:  # two-finger sets are all adjacent to each other, too
-                count += len(one) * len(other)
-                joins.append((one[:1].repeat(len(other)), other))
-        labels: IntArray = np.arange(n)
-        within: IntArray = np.arange(n)
-        listed = [np.zeros(0, dtype=np.int64)]
-        for i, j in chain(joins, ((i, j) for i, j, _ in self.switches.pairs())):
-            labels = united(labels, i, j)
-            same = kinds[i] == kinds[j]
-            within = united(within, i[same], j[same])
-            holds = need[contacts[i], contacts[j]] > 0
-            listed.append(i[holds].astype(np.int64) * n + j[holds])
-        keys = np.concatenate(listed)
-        keys.sort()  # a pair may come again
-        count += len(keys) - int(np.count_nonzero(keys[1:] == keys[:-1]))
-        return labels, within, count
+    def _structure(self) -> Structure:
+        return structure(self.sets, self.switches, self.hand)
 
     @property
     def n_switches(self) -> int:
         """Number of adjacent pairs, those that need to hold nothing included."""
-        return self._structure[2]
+        return self._structure.n_switches
 
     def components(self) -> list[set[int]]:
         """Return the connected components, as sets of set numbers, largest first."""
-        labels, _, _ = self._structure
+        labels = self._structure.component
         order = np.argsort(labels, kind="stable")
         groups = np.split(order, np.flatnonzero(np.diff(labels[order])) + 1)
         return sorted((set(g.tolist()) for g in groups if g.size), key=lambda c: (-len(c), min(c)))
 
     def summary(self) -> Summary:
         """Return counts per kind, components and times; printable."""
-        _, within, _ = self._structure
+        within = self._structure.within_kind
         kinds = {
             family.kind: KindCounts(
                 family.n_candidates, len(family), len(np.unique(within[low : low + len(family)]))
@@ -311,6 +319,15 @@ class SwitchingGraph:
         from regrasp_lp.graph_file import save_graph
 
         save_graph(self, path)
+
+    def save_certificates(self, path: str | Path) -> None:
+        """Write the proof of every decision to one file (`certificates.save_certificates`).
+
+        ``python regrasp_lp/check_certificates.py FILE`` checks it without this package.
+        """
+        from regrasp_lp.certificates import save_certificates
+
+        save_certificates(self, path)
 
     def plan(self, start: GraspLike, goal: GraspLike, aligning: str = "slide") -> Plan:
         """Return a verified plan with the fewest placements from one grasp to another.

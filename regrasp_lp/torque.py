@@ -37,6 +37,9 @@ from regrasp_lp.friction import (
     spanning,
 )
 
+ACCURATE = 1e-9
+"""Relative accuracy of margins."""
+
 _ROUNDINGS = 64 * UNIT_ROUNDOFF
 
 
@@ -165,10 +168,10 @@ class TorqueFunctions:
         return np.asarray(self.offsets + np.einsum("njm,nm->nj", self.slopes, f))
 
     def certain_values(self, fractions: FloatArray) -> FloatArray:
-        """Return `values`, with those within rounding of 0 taken from rationals: no wrong sign."""
+        """Return `values`, those near 0 taken from rationals: no wrong sign, each good to 1e-9."""
         f = np.broadcast_to(np.asarray(fractions, dtype=np.float64), self.edges.shape)
         values = self.values(f)
-        rows, columns = np.nonzero(self.valid & (np.abs(values) <= self.errors))
+        rows, columns = np.nonzero(self.valid & (ACCURATE * np.abs(values) <= self.errors))
         if rows.size:
             numerators, unit = as_integers(f[rows])
             constant, slopes = self._exact_coefficients(rows, columns)

@@ -438,6 +438,9 @@ FOCUS = ["table", "parts.geojson", "--switching", "focus"]
         (["table", "parts.geojson", "--friction", "-1"], "'-1' is no friction coefficient"),
         (["table", "parts.geojson", "--friction", "1e300"], "friction must be"),
         (["table", "parts.geojson", "--max-edges", "2"], "'2' is no number of edges"),
+        (["table", "parts.geojson", "--jobs", "0"], "'0' is no number of processes"),
+        (["table", "parts.geojson", "--jobs", "2.5"], "'2.5' is no number of processes"),
+        (["table", "parts.geojson", "--jobs", "2", "--friction", "1e300"], "friction must be"),
         (["table", "stars.geojson", "--max-edges", "14"], "no polygon has 14 edges or fewer"),
         (["table", "parts.geojson", "--switching", "x"], "choose from 'contact', 'focus'"),
         ([*FOCUS, "--sets", "complete"], "the chapter's sets"),
@@ -698,6 +701,7 @@ def test_table_goes_on_after_a_polygon_that_fails(
     failures = {
         "l_bracket": rl.SolverError("the solver\nstopped early"),
         "push_t": MemoryError(),
+        "u_channel": ZeroDivisionError("division by zero"),
         "wedge": rl.PolygonError("is no good"),
     }
     original = rl.build_switching_graph
@@ -707,17 +711,18 @@ def test_table_goes_on_after_a_polygon_that_fails(
             raise failures[polygon.name]
         return original(polygon, *rest, **options)
 
-    monkeypatch.setattr(rl, "build_switching_graph", build)
+    monkeypatch.setattr("regrasp_lp.many.build_switching_graph", build)
     code, out, err = run("table", "parts.geojson", "--max-edges", "10", "-o", "t.csv")
     assert (code, out) == (2, "wrote t.csv\n")
     assert err.splitlines() == [
         "regrasp-lp table: 2 polygons with more than 10 edges left out",
         "regrasp-lp table: error: l_bracket: the solver stopped early",
+        "regrasp-lp table: error: u_channel: ZeroDivisionError: division by zero",
         "regrasp-lp table: error: push_t: not enough memory",
         "regrasp-lp table: error: wedge: is no good",
     ]
     names = [row["name"] for row in rows_of(Path("t.csv").read_text())]
-    assert names == ["rectangle", "t_block", "u_channel"]
+    assert names == ["rectangle", "t_block"]
 
 
 def test_table_goes_on_after_a_file_that_cannot_be_read(run: Run, tmp_path: Path) -> None:
@@ -733,7 +738,7 @@ def test_table_of_nothing_is_not_written(run: Run, monkeypatch: pytest.MonkeyPat
     def fail(*_: object, **__: object) -> None:
         raise rl.SolverError("stopped early")
 
-    monkeypatch.setattr(rl, "build_switching_graph", fail)
+    monkeypatch.setattr("regrasp_lp.many.build_switching_graph", fail)
     Path("t.csv").write_text("old")
     code, out, err = run("table", "stars.geojson", "-o", "t.csv")
     assert (code, out) == (2, "")

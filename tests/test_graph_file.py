@@ -164,9 +164,9 @@ def load_or_none(path: Path) -> rl.SwitchingGraph | None:
 
 
 def test_other_versions_and_formats(saved: Path) -> None:
-    rewrite(saved, header={"version": 2})
-    assert_refused(saved, "version 2")
-    rewrite(saved, header={"version": 1, "format": "regrasp-plan"})
+    rewrite(saved, header={"version": 1})
+    assert_refused(saved, "version 1")
+    rewrite(saved, header={"version": 2, "format": "regrasp-plan"})
     assert_refused(saved, "not a graph file")
 
 

@@ -6,10 +6,10 @@ The oracles: samples of grasps in exact force closure (wrenches), elimination in
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from fractions import Fraction
-from functools import cache
+from functools import cache, partial
 from itertools import combinations, permutations
 
 import numpy as np
@@ -30,17 +30,18 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from regrasp_lp import switching
+from regrasp_lp.completion import complete
+from regrasp_lp.contact_rule import meet_by_lp, meet_held
 from regrasp_lp.force_closure import is_force_closure
 from regrasp_lp.friction import Cones
 from regrasp_lp.grasp_sets.vertices import candidate_functions, kinds_of
-from regrasp_lp.handovers import decide_held
 from regrasp_lp.joins import best_joins
 from regrasp_lp.lp import get_solver
 from regrasp_lp.planning.hand import Hand
 from regrasp_lp.polygon import Polygon
-from regrasp_lp.shadows import Shadows, shadows
-from regrasp_lp.switches import StoredSwitches, SwitchesOnDemand, SwitchRule
-from regrasp_lp.switching import can_switch
+from regrasp_lp.shadows import Shadows, first_places, shadows
+from regrasp_lp.switches import StoredSwitches, SwitchesOnDemand, SwitchPairs, SwitchRule
+from regrasp_lp.switching import Meeting, can_switch, meet
 from regrasp_lp.torque import TorqueFunctions
 
 CASES = {
@@ -323,10 +324,29 @@ def test_many_synthetic_projections_against_elimination(held: int) -> None:
 @pytest.mark.parametrize("held", [1, 2])
 def test_the_filter_agrees_with_rational_numbers_on_synthetic_projections(held: int) -> None:
     first, second = synthetic_pairs(3, 3_000, held)
-    exact = switching._exact_one_held if held == 1 else switching._exact_two_held
-    expected = [exact(first.exact(i), second.exact(i)) for i in range(len(first))]
-    np.testing.assert_array_equal(can_switch(first, second), expected)
+    exact = switching.exact_one_held if held == 1 else switching.exact_two_held
+    points = [exact(first.exact(i), second.exact(i)) for i in range(len(first))]
+    expected = [point is not None for point in points]
+    found = meet(first, second)
+    np.testing.assert_array_equal(found.exist, expected)
     np.testing.assert_array_equal(can_switch(second, first), expected)
+    for i in np.flatnonzero(expected).tolist():
+        assert all(0 <= x <= 1 and completes(first, second, i, points[i]) for x in points[i])
+        inside = completes(first, second, i, [Fraction(x) for x in found.points[i]])
+        assert inside or found.exactly[i]  # some are too thin for doubles
+    assert np.isnan(found.points[~found.exist]).all()
+
+
+def completes(first: Shadows, second: Shadows, index: int, point: Sequence[Fraction]) -> bool:
+    """Whether held positions can be completed in both sets, in rational numbers."""
+
+    def value(function: list[Fraction]) -> Fraction:
+        return function[0] + sum(s * x for s, x in zip(function[1:], point, strict=True))
+
+    return all(
+        min(map(value, below)) < 0 < max(map(value, above))
+        for below, above in (first.exact(index), second.exact(index))
+    )
 
 
 small = st.integers(-4, 4)
@@ -351,13 +371,13 @@ def exact_shadows(held: int) -> st.SearchStrategy:
 @settings(max_examples=150)
 @given(exact_shadows(1), exact_shadows(1))
 def test_one_held_contact_in_rational_numbers(first: tuple, second: tuple) -> None:
-    assert switching._exact_one_held(first, second) == meets(first, second, 1)
+    assert (switching.exact_one_held(first, second) is not None) == meets(first, second, 1)
 
 
 @settings(max_examples=150)
 @given(exact_shadows(2), exact_shadows(2))
 def test_two_held_contacts_in_rational_numbers(first: tuple, second: tuple) -> None:
-    assert switching._exact_two_held(first, second) == meets(first, second, 2)
+    assert (switching.exact_two_held(first, second) is not None) == meets(first, second, 2)
 
 
 def meets(first: tuple, second: tuple, held: int) -> bool:
@@ -406,9 +426,9 @@ def test_the_filter_agrees_with_rational_numbers(case: str, sets: str, held: int
     rng = np.random.default_rng(0)
     no = np.flatnonzero(~found.answer)[:200]
     chosen = np.concatenate((no, rng.permutation(np.flatnonzero(found.answer))[:200]))
-    exact = switching._exact_one_held if held == 1 else switching._exact_two_held
+    exact = switching.exact_one_held if held == 1 else switching.exact_two_held
     for i in chosen:
-        assert exact(found.first.exact(i), found.second.exact(i)) == found.answer[i]
+        assert (exact(found.first.exact(i), found.second.exact(i)) is not None) == found.answer[i]
 
 
 @pytest.mark.slow
@@ -416,9 +436,9 @@ def test_the_filter_agrees_with_rational_numbers(case: str, sets: str, held: int
 @pytest.mark.parametrize("held", [1, 2])
 def test_the_filter_agrees_with_rational_numbers_on_all_pairs(case: str, held: int) -> None:
     found = pairs_within(shadows(sources(case, "complete"), held), most=10**9)
-    exact = switching._exact_one_held if held == 1 else switching._exact_two_held
-    expected = [exact(found.first.exact(i), found.second.exact(i)) for i in range(len(found.first))]
-    np.testing.assert_array_equal(found.answer, expected)
+    exact = switching.exact_one_held if held == 1 else switching.exact_two_held
+    points = [exact(found.first.exact(i), found.second.exact(i)) for i in range(len(found.first))]
+    np.testing.assert_array_equal(found.answer, [point is not None for point in points])
 
 
 @pytest.mark.parametrize(
@@ -429,16 +449,16 @@ def test_touching_projections_reach_the_rational_numbers(
     case: str, held: int, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     found = pairs_of(case, "complete", held)
-    name = "_exact_one_held" if held == 1 else "_exact_two_held"
+    name = "exact_one_held" if held == 1 else "exact_two_held"
     original, answers = getattr(switching, name), []
 
-    def counting(*both: tuple) -> bool:
+    def counting(*both: tuple) -> tuple | None:
         answers.append(original(*both))
         return answers[-1]
 
     monkeypatch.setattr(switching, name, counting)
     np.testing.assert_array_equal(can_switch(found.first, found.second), found.answer)
-    assert answers.count(False) > 3
+    assert answers.count(None) > 3
 
 
 @pytest.mark.parametrize("case", CASES)
@@ -553,11 +573,8 @@ def test_all_three_contacts_held_between_two_centres() -> None:
     polygon = star(7, 0)
     stacks = existing(Cones.of(polygon, 2.0), "chapter")
 
-    def decide(first: Shadows, second: Shadows) -> np.ndarray:
-        return decide_held(first, second, get_solver("highs"))
-
-    rule = SwitchRule(stacks, Hand(), decide)
-    first, second, held = rule.pairs()
+    rule = SwitchRule(stacks, Hand(), partial(meet_held, solver=get_solver("highs")))
+    first, second, held = relation(rule.pairs())
     edges = np.concatenate(
         [np.pad(f.edges, ((0, 0), (0, 3 - f.m)), constant_values=-1) for f in stacks]
     )
@@ -574,6 +591,10 @@ def test_all_three_contacts_held_between_two_centres() -> None:
         assert (number == 3) == intersect(exact[i], exact[j], 3)
 
 
+def relation(pairs: SwitchPairs) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    return pairs.first, pairs.second, pairs.held
+
+
 # --- all pairs of sets --------------------------------------------------------------------------
 
 RULES = {
@@ -587,7 +608,7 @@ RULES = {
 
 def rule_of(name: str, fingers: int) -> SwitchRule:
     polygon, friction, sets = RULES[name]
-    return SwitchRule(existing(Cones.of(polygon, friction), sets), Hand(fingers), can_switch)
+    return SwitchRule(existing(Cones.of(polygon, friction), sets), Hand(fingers), meet)
 
 
 def brute_switches(rule: SwitchRule) -> dict[tuple[int, int], int]:
@@ -638,9 +659,9 @@ def meets_projected(
 def test_pairs_and_neighbours_are_two_views_of_one_relation(name: str, fingers: int) -> None:
     rule = rule_of(name, fingers)
     n = sum(len(f) for f in rule.sources)
-    first, second, held = rule.pairs()
+    first, second, held = relation(rule.pairs())
     assert (first < second).all()
-    stored = StoredSwitches.of_pairs(n, first, second, held)
+    stored = StoredSwitches.of_pairs(n, rule.pairs())
     on_demand = SwitchesOnDemand(rule)
     from_sets = {}
     for index in range(n):
@@ -658,10 +679,10 @@ def test_pairs_and_neighbours_are_two_views_of_one_relation(name: str, fingers: 
     assert (held >= np.maximum(needed, 1)).all()
 
 
-def as_mapping(chunks: Iterator[tuple[np.ndarray, ...]]) -> dict[tuple[int, int], int]:
+def as_mapping(chunks: Iterator[SwitchPairs]) -> dict[tuple[int, int], int]:
     result: dict[tuple[int, int], int] = {}
     for chunk in chunks:
-        for i, j, held in zip(*(c.tolist() for c in chunk), strict=True):
+        for i, j, held in zip(*(c.tolist() for c in relation(chunk)), strict=True):
             assert i < j
             result[i, j] = max(held, result.get((i, j), 0))
     return result
@@ -672,9 +693,9 @@ def test_pairs_equal_a_loop_over_all_matchings(name: str) -> None:
     for fingers in (3, 4, 5, 6):
         rule = rule_of(name, fingers)
         rule = SwitchRule(
-            tuple(f.take(np.arange(min(len(f), 12))) for f in rule.sources), rule.hand, can_switch
+            tuple(f.take(np.arange(min(len(f), 12))) for f in rule.sources), rule.hand, meet
         )
-        first, second, held = rule.pairs()
+        first, second, held = relation(rule.pairs())
         found = zip(zip(first.tolist(), second.tolist(), strict=True), held.tolist(), strict=True)
         assert dict(found) == brute_switches(rule)
 
@@ -682,7 +703,7 @@ def test_pairs_equal_a_loop_over_all_matchings(name: str) -> None:
 def test_more_fingers_allow_more_switches() -> None:
     allowed = []
     for fingers in (3, 4, 5, 6):
-        first, second, _ = rule_of("comb", fingers).pairs()
+        first, second, _ = relation(rule_of("comb", fingers).pairs())
         allowed.append(set(zip(first.tolist(), second.tolist(), strict=True)))
     assert allowed[0] < allowed[1] < allowed[2] <= allowed[3]
 
@@ -700,30 +721,53 @@ def test_chunks_of_pairs_do_not_change_the_pairs(monkeypatch: pytest.MonkeyPatch
     told = []
     found = rule_of("comb", 4).pairs(lambda what, done, total: told.append(done))
     assert len(told) > 10
-    for one, other in zip(found, expected, strict=True):
-        np.testing.assert_array_equal(one, other)
+    for name in ("first", "second", "held", "slots", "points"):
+        np.testing.assert_array_equal(getattr(found, name), getattr(expected, name))
 
 
 def test_an_object_without_sets_has_no_switches() -> None:
     stacks = existing(Cones.of(regular(5), 1e-3), "complete")
     nothing = tuple(f.take(np.zeros(0, dtype=np.intp)) for f in stacks)
-    rule = SwitchRule(nothing, Hand(), can_switch)
+    rule = SwitchRule(nothing, Hand(), meet)
     assert rule.n_pairs == 0
-    assert [len(v) for v in rule.pairs()] == [0, 0, 0]
-    stored = StoredSwitches.of_pairs(0, *rule.pairs())
-    assert [len(v) for chunk in stored.pairs() for v in chunk] == [0, 0, 0]
+    assert len(rule.pairs()) == 0
+    stored = StoredSwitches.of_pairs(0, rule.pairs())
+    assert [len(chunk) for chunk in stored.pairs()] == [0]
 
 
 def test_linear_programs_as_the_decider_find_the_same_pairs() -> None:
     polygon, friction = lattice_star(8, 3), 0.125
     stacks = existing(Cones.of(polygon, friction), "complete")
 
-    def by_programs(first: Shadows, second: Shadows) -> np.ndarray:
-        return best_joins(first, second, get_solver("highs")).exist
+    def by_programs(first: Shadows, second: Shadows, i: np.ndarray, j: np.ndarray) -> Meeting:
+        return meet_by_lp(first.take(i), second.take(j), get_solver("highs"), exact=False)
 
     for one, other in zip(
-        SwitchRule(stacks, Hand(), by_programs).pairs(),
-        SwitchRule(stacks, Hand(), can_switch).pairs(),
+        relation(SwitchRule(stacks, Hand(), by_programs).pairs()),
+        relation(SwitchRule(stacks, Hand(), meet).pairs()),
         strict=True,
     ):
         np.testing.assert_array_equal(one, other)
+
+
+@pytest.mark.parametrize("name", RULES)
+@pytest.mark.parametrize("fingers", [3, 4, 5])
+def test_every_stored_switch_has_a_witness_in_both_sets(name: str, fingers: int) -> None:
+    rule = rule_of(name, fingers)
+    pairs = rule.pairs()
+    for n in range(0, len(pairs), max(1, len(pairs) // 300)):
+        held = pairs.held[n]
+        slots, points = pairs.slots[n, :held], pairs.points[n, :held]
+        assert (pairs.slots[n, held:] == -1).all()
+        sides = []
+        for index in (pairs.first[n], pairs.second[n]):
+            source = np.searchsorted(rule.offsets, index, side="right") - 1
+            functions = rule.sources[source].take(np.array([index - rule.offsets[source]]))
+            if not sides:
+                edges = functions.edges[0, slots].tolist()
+            there = first_places(edges, functions.edges[0].tolist())
+            fractions = complete(functions, np.array([there]), points[None])
+            assert functions.contain(fractions)[0]
+            np.testing.assert_array_equal(fractions[0, there], points)
+            sides.append(there)
+        assert sides[0] == slots.tolist()

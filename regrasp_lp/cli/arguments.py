@@ -78,7 +78,7 @@ and the rule for switches. The hand has four fingers."""
 _TABLE_EXAMPLES = """\
 examples:
   regrasp-lp table parts.geojson
-  regrasp-lp table . --max-edges 40 -o table.csv
+  regrasp-lp table . --max-edges 40 --jobs 2 -o table.csv
   regrasp-lp table parts.geojson --sets complete --friction 0.2 -o table.md
 
 exit codes:
@@ -126,6 +126,9 @@ class UsageError(OptionError):
     def __init__(self, program: str, message: str) -> None:
         super().__init__(message)
         self.program = program
+
+    def __reduce__(self) -> tuple[type[UsageError], tuple[str, str]]:
+        return UsageError, (self.program, str(self))
 
 
 class _Formatter(argparse.RawDescriptionHelpFormatter):
@@ -252,6 +255,14 @@ def _add_table(parser: argparse.ArgumentParser) -> None:
         default=math.inf,
         metavar="N",
         help="leave out polygons of more edges",
+    )
+    parser.add_argument(
+        "--jobs",
+        type=values.jobs,
+        default=1,
+        metavar="N",
+        help="compute N polygons at a time, in as many processes; the table is the same "
+        "(default: 1)",
     )
     parser.add_argument(
         "--format",

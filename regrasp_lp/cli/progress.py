@@ -52,7 +52,8 @@ class ProgressBar:
 
     def __call__(self, what: str, done: int, total: int) -> None:
         """Tell what is being done, and how much of it is; a total of 0 is an unknown one."""
-        self._state = (what.replace("_", "-"), done, total)
+        # not other underscores, which may belong to the name of an object
+        self._state = (what.replace("_finger", "-finger"), done, total)
 
     def __enter__(self) -> ProgressBar:
         if _is_terminal(self._stream):

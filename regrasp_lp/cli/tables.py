@@ -4,14 +4,17 @@ from __future__ import annotations
 
 from argparse import Namespace
 from collections.abc import Callable, Iterable, Sequence
+from concurrent.futures import BrokenExecutor
+from contextlib import nullcontext
 from pathlib import Path
 from typing import TypeVar
 
 import regrasp_lp
-from regrasp_lp import Polygon
+from regrasp_lp import Polygon, SwitchingGraph
 from regrasp_lp.cli.progress import ProgressBar
-from regrasp_lp.errors import FileFormatError, PolygonError, SolverError
+from regrasp_lp.errors import FileFormatError, RegraspError
 from regrasp_lp.summary import Summary
+from regrasp_lp.workers import WorkerProcesses
 
 SWITCHING = {"chapter": "focus", "complete": "contact"}
 """The rule for switches that goes with each kind of sets, if none is asked for."""
@@ -37,13 +40,13 @@ def attempt(
     results : list
         Those of the items that did not fail.
     failures : list of str
-        Messages of errors that concern one item only; others are raised.
+        Messages of files that cannot be read; other errors are raised.
     """
     results, failures = [], []
     for item in items:
         try:
             results.append(function(item))
-        except (FileFormatError, PolygonError, SolverError) as error:
+        except FileFormatError as error:
             failures.append(str(error))
     return results, failures
 
@@ -71,25 +74,33 @@ def polygon_files(path: str) -> list[Path]:
 def summaries_of(
     polygons: Sequence[Polygon], options: Namespace
 ) -> tuple[list[Summary], list[str]]:
-    """Build the graph of each polygon; return their summaries, and why there are none of some."""
-    with ProgressBar() as bar:
+    """Build the graph of each polygon; return their summaries, and why there are none of some.
 
-        def summary(number: int) -> Summary:
-            polygon = polygons[number]
-            bar.subject = f"{polygon.name} ({number + 1} of {len(polygons)})"
-            try:
-                graph = regrasp_lp.build_switching_graph(
-                    polygon,
-                    options.friction,
-                    sets=options.sets,
-                    switching=options.switching or SWITCHING[options.sets],
-                    progress=bar,
-                )
-                bar("counting", 0, 0)
-                return graph.summary()
-            except MemoryError as error:
-                raise SolverError(f"{polygon.name}: not enough memory") from error
-            except (PolygonError, SolverError) as error:
-                raise type(error)(f"{polygon.name}: {error}") from error
+    Both in the order of the polygons, however many are built at a time.
+    """
+    jobs = min(options.jobs, len(polygons))
+    order = list(range(len(polygons)))
+    if jobs > 1:  # the largest first, so that no process is left alone with it at the end
+        order.sort(key=lambda place: -polygons[place].n_edges)
+    with WorkerProcesses(jobs) if jobs > 1 else nullcontext() as workers, ProgressBar() as bar:
+        outcomes = regrasp_lp.build_switching_graphs(
+            [polygons[place] for place in order],
+            options.friction,
+            workers,
+            sets=options.sets,
+            switching=options.switching or SWITCHING[options.sets],
+            apply=SwitchingGraph.summary,
+            progress=bar,
+        )
+        # graphs stay where they are built: only their summaries come, and are all kept
+        built = sorted(outcomes, key=lambda one: order[one.index])
+    failures = [f"{one.name}: {_reason(one.error)}" for one in built if one.error is not None]
+    return [one.value for one in built if one.error is None], failures
 
-        return attempt(summary, range(len(polygons)))
+
+def _reason(error: Exception) -> str:
+    if isinstance(error, MemoryError):
+        return "not enough memory"
+    if isinstance(error, (RegraspError, BrokenExecutor)):
+        return str(error)
+    return f"{type(error).__name__}: {error}"  # nobody has written it to be read alone

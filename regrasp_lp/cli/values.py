@@ -102,6 +102,14 @@ def edges(text: str) -> int:
     return number
 
 
+def jobs(text: str) -> int:
+    """Read a number of processes, 1 or more."""
+    number = _whole(text)
+    if number is None or number < 1:
+        raise argparse.ArgumentTypeError(f"{text!r} is no number of processes; write 1 or more")
+    return number
+
+
 def length(text: str) -> float:
     """Read a length, 0 or more."""
     value = _number(text)

@@ -9,7 +9,8 @@ from itertools import permutations
 
 import numpy as np
 
-from regrasp_lp.errors import OptionError
+from regrasp_lp.errors import OptionError, SolverError
+from regrasp_lp.exact_margins import certain_margins, exceeds
 from regrasp_lp.friction import BoolArray, Cones, FloatArray, IntArray
 from regrasp_lp.grasp_sets.candidates import (
     complete_candidates,
@@ -19,7 +20,7 @@ from regrasp_lp.grasp_sets.candidates import (
 )
 from regrasp_lp.grasp_sets.families import parallel_functions
 from regrasp_lp.grasp_sets.pieces import piece_sets
-from regrasp_lp.lp import MarginSolutions, Solver, maximise_margins
+from regrasp_lp.lp import GAP, MarginSolutions, Solver, maximise_margins
 from regrasp_lp.margins import best_pieces
 from regrasp_lp.torque import TorqueFunctions, torque_functions
 
@@ -43,7 +44,7 @@ class Family:
     margins : numpy.ndarray, shape (N,)
         Largest margin of a grasp in the set, in the object's unit.
     witnesses : numpy.ndarray, shape (N, m)
-        Fractions of a grasp strictly inside that attains it.
+        Fractions of a grasp strictly inside that attains it, to the accuracy of the solver.
     n_candidates : int
         Number of combinations that were considered.
     """
@@ -99,9 +100,10 @@ def build_family(
 ) -> Family:
     """Return all existing grasp sets of one kind.
 
-    With `presolve` the signs of torque functions at two corners decide which sets exist, a closed
-    form says which piece of each is best, and the solver maximises the margin there. Without it
-    the solver maximises the margin of every piece of every candidate.
+    With `presolve` the signs of torque functions at two corners decide which sets exist, and a
+    closed form gives the margin of each and the piece that attains it; the solver confirms the
+    margin and finds the witness. Without it the solver maximises the margin of every piece of every
+    candidate.
 
     Parameters
     ----------
@@ -150,7 +152,8 @@ def solve_family(
     kept = np.flatnonzero(functions.exists() if presolve else functions.spans)
     functions, centers = functions.take(kept), centers[kept]
     if presolve:
-        chosen = np.column_stack((np.arange(len(functions)), best_pieces(functions)[1]))
+        closed, best = best_pieces(functions)
+        chosen = np.column_stack((np.arange(len(functions)), best))
     else:
         chosen = _all_pieces(functions)
 
@@ -162,13 +165,30 @@ def solve_family(
     solutions = maximise_margins(piece_sets(functions, chosen, names), solver, tell)
     margins, witnesses, exists = _best_of_each(len(functions), functions.m, chosen, solutions)
     if presolve:
+        _confirm(closed, solutions, solver)
+        margins = certain_margins(functions, closed, best)
         exists = np.ones(len(functions), dtype=bool)
     witnesses = _off_corners(functions, _inside(functions, _spread(functions, witnesses)))
-    exists &= margins > min_margin if min_margin > 0 else True
+    if min_margin > 0:
+        exists &= exceeds(functions, margins, min_margin) if presolve else margins > min_margin
     kept = np.flatnonzero(exists)
     return Family(
         kind, functions.take(kept), centers[kept], margins[kept], witnesses[kept], n_candidates
     )
+
+
+def _confirm(closed: FloatArray, solutions: MarginSolutions, solver: Solver) -> None:
+    """Check the margins of a closed form against the two bounds that a solver's answers gave."""
+    slack = GAP * solutions.units
+    apart = (closed < solutions.margins - slack) | (closed > solutions.bounds + slack)
+    if apart.any():
+        worst = int(np.abs(closed - solutions.margins)[apart].argmax())
+        raise SolverError(
+            f"{np.count_nonzero(apart)} of {len(closed)} margins of grasp sets in closed form are "
+            f"outside the bounds from {solver.name} (the worst: {closed[apart][worst]:.9g}, "
+            f"{solver.name} {solutions.margins[apart][worst]:.9g}): try the other solver, or "
+            "presolve=False"
+        )
 
 
 def _all_pieces(functions: TorqueFunctions) -> IntArray:

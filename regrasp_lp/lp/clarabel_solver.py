@@ -9,7 +9,6 @@ import numpy as np
 from scipy import sparse
 
 from regrasp_lp.linear_sets import FloatArray, LinearSets
-from regrasp_lp.lp.highs_solver import HighsSolver
 
 
 @dataclass(frozen=True)
@@ -20,37 +19,45 @@ class ClarabelSolver:
     ----------
     tolerance : float
         Relative and absolute gap and feasibility asked for.
+    max_iterations : int
+        Of one call.
     """
 
     tolerance: float = 1e-11
+    max_iterations: int = 100
     name: str = "clarabel"
 
     def solve(self, sets: LinearSets, *, thorough: bool) -> tuple[FloatArray, FloatArray]:
-        """Return points and row multipliers; thorough means by HiGHS, a vertex each."""
-        if thorough:
-            return HighsSolver().solve(sets, thorough=False)
-        return self._solve_stacked(sets)
+        """Return points and row multipliers.
 
-    def _solve_stacked(self, sets: LinearSets) -> tuple[FloatArray, FloatArray]:
+        Thorough means with shorter steps and without regularising pivots or rescaling rows.
+        """
         b, r, n = sets.rows.shape
         height = r + 2 * n
         objective = np.tile(np.append(np.zeros(n), -1.0), b)
         limits = np.concatenate((sets.bounds, sets.upper, -sets.lower), axis=1).ravel()
-        settings = clarabel.DefaultSettings()
-        settings.verbose = False
-        settings.tol_gap_abs = settings.tol_gap_rel = settings.tol_feas = self.tolerance
-        settings.max_iter = 100
         solution = clarabel.DefaultSolver(
             sparse.csc_matrix((b * (n + 1), b * (n + 1))),
             objective,
             _block_diagonal(sets),
             limits,
             [clarabel.NonnegativeConeT(b * height)],
-            settings,
+            self._settings(thorough=thorough),
         ).solve()
         points = np.array(solution.x).reshape(b, n + 1)[:, :n]
         multipliers = np.array(solution.z).reshape(b, height)[:, :r]
         return points, multipliers
+
+    def _settings(self, *, thorough: bool) -> clarabel.DefaultSettings:
+        settings = clarabel.DefaultSettings()
+        settings.verbose = False
+        settings.tol_gap_abs = settings.tol_gap_rel = settings.tol_feas = self.tolerance
+        settings.max_iter = self.max_iterations
+        if thorough:
+            settings.max_step_fraction = 0.9
+            settings.equilibrate_enable = False
+            settings.static_regularization_constant = 1e-12
+        return settings
 
 
 def _block_diagonal(sets: LinearSets) -> sparse.csc_matrix:

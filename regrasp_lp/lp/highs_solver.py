@@ -18,20 +18,17 @@ class HighsSolver:
     ----------
     tolerance : float
         Primal and dual feasibility asked for (HiGHS takes no less than 1e-10).
+    max_iterations : int
+        Of one LP.
     """
 
     tolerance: float = 1e-10
+    max_iterations: int = 10_000
     name: str = "highs"
 
     def solve(self, sets: LinearSets, *, thorough: bool) -> tuple[FloatArray, FloatArray]:
         """Return points and row multipliers; thorough means the interior-point method."""
-        highs = highspy.Highs()
-        highs.setOptionValue("output_flag", False)
-        highs.setOptionValue("presolve", "off")
-        highs.setOptionValue("primal_feasibility_tolerance", self.tolerance)
-        highs.setOptionValue("dual_feasibility_tolerance", self.tolerance)
-        if thorough:
-            highs.setOptionValue("solver", "ipm")
+        highs = self._highs(thorough=thorough)
         b, r, n = sets.rows.shape
         points, multipliers = np.full((b, n), np.nan), np.full((b, r), np.nan)
         lp = highspy.HighsLp()
@@ -49,8 +46,21 @@ class HighsSolver:
             lp.col_upper_ = np.append(sets.upper[i], highspy.kHighsInf)
             highs.passModel(lp)
             highs.run()
-            if highs.getModelStatus() == highspy.HighsModelStatus.kOptimal:
-                solution = highs.getSolution()
+            # Whatever the status is: the answer is checked, and a status is not believed.
+            solution = highs.getSolution()
+            if solution.value_valid and solution.dual_valid:
                 points[i] = solution.col_value[:n]
                 multipliers[i] = -np.array(solution.row_dual)
         return points, multipliers
+
+    def _highs(self, *, thorough: bool) -> highspy.Highs:
+        highs = highspy.Highs()
+        highs.setOptionValue("output_flag", False)
+        highs.setOptionValue("presolve", "off")
+        highs.setOptionValue("primal_feasibility_tolerance", self.tolerance)
+        highs.setOptionValue("dual_feasibility_tolerance", self.tolerance)
+        highs.setOptionValue("simplex_iteration_limit", self.max_iterations)
+        highs.setOptionValue("ipm_iteration_limit", self.max_iterations)
+        if thorough:
+            highs.setOptionValue("solver", "ipm")
+        return highs

@@ -1,37 +1,26 @@
-"""The margin LP, the check of what a solver says of it, and the choice of a solver."""
+"""The margin LP, and the check of what a solver says of it."""
 
 from __future__ import annotations
 
+import logging
+from collections import Counter
 from collections.abc import Callable
 from dataclasses import dataclass, replace
-from typing import Protocol
 
 import numpy as np
 from numpy.typing import NDArray
 
 from regrasp_lp.errors import OptionError, SolverError
 from regrasp_lp.linear_sets import FloatArray, LinearSets
+from regrasp_lp.lp.ladder import Account, Tried, attempts
+from regrasp_lp.lp.solver import Solver
 
 GAP = 1e-8
 """Largest accepted gap between the two bounds of a margin, relative to the rows' magnitude."""
 
 _STACK = 4000
 
-
-class Solver(Protocol):
-    """A linear programming code, as a value.
-
-    `solve` returns for a stack of B sets in the unit box, with rows of magnitude 1, a point (B, n)
-    and multipliers (B, R) of the rows, as good as it could; how good they are is found out by the
-    caller. `thorough` asks for another, slower way.
-    """
-
-    @property
-    def name(self) -> str:
-        """Its name in the public interface."""
-
-    def solve(self, sets: LinearSets, *, thorough: bool) -> tuple[FloatArray, FloatArray]:
-        """Return points (B, n) and row multipliers (B, R); NaN where the solver failed."""
+_LOG = logging.getLogger("regrasp_lp")
 
 
 @dataclass(frozen=True, eq=False)
@@ -59,8 +48,15 @@ class MarginSolutions:
     @property
     def solved(self) -> NDArray[np.bool_]:
         """Where the two bounds agree to `GAP`."""
-        with np.errstate(invalid="ignore"):
-            return np.asarray(self.bounds - self.margins <= GAP * self.units)
+        return np.asarray(self.gaps <= GAP)
+
+    @property
+    def gaps(self) -> FloatArray:
+        """Distance of the two bounds, relative to `units`; inf where one is missing."""
+        with np.errstate(invalid="ignore", over="ignore"):
+            # Bounds that are the wrong way round by more than rounding prove nothing.
+            gaps = np.abs(self.bounds - self.margins) / self.units
+        return np.where(np.isnan(gaps), np.inf, gaps)
 
     @property
     def positive(self) -> NDArray[np.bool_]:
@@ -68,36 +64,19 @@ class MarginSolutions:
         return self.margins > GAP * self.units
 
 
-def get_solver(name: str) -> Solver:
-    """Return a solver by its public name, "clarabel" or "highs".
-
-    Raises
-    ------
-    OptionError
-        If there is no such solver.
-    """
-    if name == "clarabel":
-        from regrasp_lp.lp.clarabel_solver import ClarabelSolver
-
-        return ClarabelSolver()
-    if name == "highs":
-        from regrasp_lp.lp.highs_solver import HighsSolver
-
-        return HighsSolver()
-    raise OptionError(f'solver must be "clarabel" or "highs", got {name!r}')
-
-
 def maximise_margins(
     sets: LinearSets, solver: Solver, progress: Callable[[int], None] | None = None
 ) -> MarginSolutions:
     """Solve the margin LP of every set of a stack.
 
-    What the solver leaves with a gap above `GAP` is tried again thoroughly.
+    What the solver leaves with a gap above `GAP`, or fails on, is tried again: one by one, another
+    way, by the other solver, and in rational numbers. A warning of the logger ``regrasp_lp`` says
+    how many, and what solved them.
 
     Parameters
     ----------
     sets : LinearSets
-        At least one row of each has a positive scale.
+        At least one row of each has a positive scale; rows of scale 0 leave a point of the box.
     solver : Solver
     progress : callable, optional
         Called with the number of LPs done, now and then.
@@ -109,12 +88,11 @@ def maximise_margins(
     Raises
     ------
     OptionError
-        If a box is not bounded.
+        If a number is not finite, a box is empty, or no row of a set has a positive scale.
     SolverError
-        If some LP is still open; the message says how many, and the worst gap.
+        If some LP is still open; the message says what was tried, on how many, and the worst gap.
     """
-    if not (np.isfinite(sets.lower).all() and np.isfinite(sets.upper).all()):
-        raise OptionError("a margin LP needs a bounded box: set lower and upper")
+    _check(sets)
     parts = []
     for first in range(0, len(sets), _STACK):
         part = sets.take(np.arange(first, min(first + _STACK, len(sets))))
@@ -128,8 +106,50 @@ def maximise_margins(
     return MarginSolutions(*(np.concatenate([getattr(p, f) for p in parts]) for f in fields))
 
 
+def _check(sets: LinearSets) -> None:
+    """Raise OptionError where a margin LP is none."""
+    if not (np.isfinite(sets.lower).all() and np.isfinite(sets.upper).all()):
+        raise OptionError("a margin LP needs a bounded box: set lower and upper")
+    finite = np.isfinite(sets.bounds) & np.isfinite(sets.rows).all(axis=2)
+    conditions = (
+        (finite.all(axis=1), "a number that is not finite"),
+        ((sets.lower <= sets.upper).all(axis=1), "an empty box, lower > upper"),
+        ((np.isfinite(sets.scales) & (sets.scales >= 0)).all(axis=1), "a scale that is not >= 0"),
+        ((sets.scales > 0).any(axis=1), "no row of positive scale, so that no margin is largest"),
+    )
+    for good, fault in conditions:
+        if not good.all():
+            raise OptionError(f"margin LP {int(np.argmin(good))} of {len(sets)} has {fault}")
+
+
 def _solve_stack(sets: LinearSets, solver: Solver) -> MarginSolutions:
+    scaled, units = _scaled(sets)
     width = sets.upper - sets.lower
+    account = Account(len(sets))
+    solution, open_ = None, np.arange(len(sets))
+    for attempt in attempts(solver):
+        faults: Counter[str] = Counter()
+        points, multipliers = attempt.ask(scaled.take(open_), faults)
+        with np.errstate(all="ignore"):
+            points = sets.lower[open_] + width[open_] * points
+        found = enclose(sets.take(open_), points, multipliers, units[open_])
+        solution = found if solution is None else _merge(solution, found, open_)
+        left = open_[~solution.solved[open_]]
+        worst = float(solution.gaps[left].max(initial=0.0))
+        account.tried.append(Tried(attempt.label, len(open_), len(left), worst, faults))
+        open_ = left
+        if not open_.size:
+            break
+    if open_.size:
+        raise SolverError(account.failed(GAP))
+    if len(account.tried) > 1:
+        _LOG.warning("%s", account.retried())
+    assert solution is not None  # there is a first attempt
+    return solution
+
+
+def _scaled(sets: LinearSets) -> tuple[LinearSets, FloatArray]:
+    """The sets in the unit box, with rows of magnitude 1, and the units of the gaps."""
     boxed = sets.in_unit_box()  # solvers have absolute tolerances
     units = np.maximum(
         np.abs(boxed.rows).max(axis=(1, 2), initial=0.0),
@@ -141,30 +161,20 @@ def _solve_stack(sets: LinearSets, solver: Solver) -> MarginSolutions:
     )
     # A rounding error in a row of small scale is a large one in the margin.
     least = np.where(sets.scales > 0, sets.scales, 1.0).min(axis=1, initial=1.0)
-    units = units / least
+    return scaled, units / least
 
-    def solve(rows: NDArray[np.intp], *, thorough: bool) -> MarginSolutions:
-        points, multipliers = solver.solve(scaled.take(rows), thorough=thorough)
-        points = sets.lower[rows] + width[rows] * points
-        return enclose(sets.take(rows), points, multipliers, units[rows])
 
-    solution = solve(np.arange(len(sets)), thorough=False)
-    open_ = np.flatnonzero(~solution.solved)
-    if not open_.size:
-        return solution
-    again = solve(open_, thorough=True)
-    if not again.solved.all():
-        gap = np.nanmax(np.where(again.solved, 0, (again.bounds - again.margins) / again.units))
-        raise SolverError(
-            f"{solver.name} left {np.count_nonzero(~again.solved)} of {len(sets)} margin LPs open "
-            f"(worst relative gap {gap:.1e}, accepted {GAP:.0e}): this is neither yes nor no; "
-            "try the other solver"
-        )
-    merged = {}
-    for field in ("points", "margins", "bounds"):
-        merged[field] = getattr(solution, field).copy()
-        merged[field][open_] = getattr(again, field)
-    return MarginSolutions(merged["points"], merged["margins"], merged["bounds"], units)
+def _merge(
+    solution: MarginSolutions, found: MarginSolutions, rows: NDArray[np.intp]
+) -> MarginSolutions:
+    """The better point and the better bound of two attempts at some of the LPs: both hold."""
+    points, margins = solution.points.copy(), solution.margins.copy()
+    bounds = solution.bounds.copy()
+    better = rows[found.margins > margins[rows]]
+    points[better] = found.points[found.margins > solution.margins[rows]]
+    margins[better] = found.margins[found.margins > solution.margins[rows]]
+    bounds[rows] = np.minimum(bounds[rows], found.bounds)
+    return MarginSolutions(points, margins, bounds, solution.units)
 
 
 def enclose(
@@ -193,11 +203,15 @@ def enclose(
     middle = (sets.lower + sets.upper) / 2
     points = np.clip(np.where(failed[:, None], middle, points), sets.lower, sets.upper)
     y = np.maximum(np.where(failed[:, None], 1.0, multipliers), 0.0)
-    total = (y * sets.scales).sum(axis=1)
-    ok = total > 0
-    y = y / np.where(ok, total, 1.0)[:, None]
-    gradient = np.einsum("br,brn->bn", y, sets.rows)
-    over_box = np.maximum(-gradient * sets.lower, -gradient * sets.upper).sum(axis=1)
-    bounds = np.where(ok & ~failed, (y * sets.bounds).sum(axis=1) + over_box, np.inf)
-    margins = np.where(failed, -np.inf, sets.margins(points))
-    return MarginSolutions(points, margins, bounds, units)
+    with np.errstate(
+        all="ignore"
+    ):  # of garbage anything may overflow: what is no number is no bound
+        y = y / y.max(axis=1, keepdims=True, initial=np.finfo(float).tiny)
+        total = (y * sets.scales).sum(axis=1)
+        y = y / total[:, None]
+        gradient = np.einsum("br,brn->bn", y, sets.rows)
+        over_box = np.maximum(-gradient * sets.lower, -gradient * sets.upper).sum(axis=1)
+        bounds = (y * sets.bounds).sum(axis=1) + over_box
+        margins = np.where(failed, -np.inf, sets.margins(points))
+    good = (total > 0) & ~failed & np.isfinite(bounds)
+    return MarginSolutions(points, margins, np.where(good, bounds, np.inf), units)

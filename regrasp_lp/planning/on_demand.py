@@ -17,11 +17,11 @@ from functools import partial
 import numpy as np
 
 from regrasp_lp.contact import Grasp
+from regrasp_lp.contact_rule import meet_held
 from regrasp_lp.friction import Cones, FloatArray, IntArray, spanning
 from regrasp_lp.grasp_sets.candidates import runs, two_finger_candidates
 from regrasp_lp.grasp_sets.collection import GraspSets
 from regrasp_lp.grasp_sets.vertices import solve_family
-from regrasp_lp.handovers import decide_held
 from regrasp_lp.lp import Solver
 from regrasp_lp.margins import best_pieces
 from regrasp_lp.planning.hand import Hand
@@ -29,7 +29,7 @@ from regrasp_lp.planning.planner import PlanningProblem
 from regrasp_lp.polygon import Polygon
 from regrasp_lp.shadows import shadows
 from regrasp_lp.switches import StoredSwitches, SwitchRule
-from regrasp_lp.switching import can_switch
+from regrasp_lp.switching import meet
 from regrasp_lp.torque import TorqueFunctions, torque_functions
 
 _CHUNK = 200_000
@@ -74,8 +74,8 @@ def problem_on_demand(
         families.append(solve_family(kind, functions, np.full(len(edges), -1), solver))
     sets = GraspSets(polygon, tuple(families))
     hand = Hand(4)
-    switch_rule = SwitchRule(sets.sources, hand, partial(decide_held, solver=solver))
-    switches = StoredSwitches.of_pairs(len(sets), *switch_rule.pairs())
+    switch_rule = SwitchRule(sets.sources, hand, partial(meet_held, solver=solver))
+    switches = StoredSwitches.of_pairs(len(sets), switch_rule.pairs())
     return PlanningProblem(sets, switches, hand, cones.friction, solver)
 
 
@@ -210,7 +210,7 @@ def _adjacent(one: TorqueFunctions, other: TorqueFunctions) -> tuple[IntArray, I
     # A two-finger set and itself are no pair; a set is never in both stacks otherwise.
     if one.m == other.m == 2:
         return np.zeros(0, dtype=np.intp), np.zeros(0, dtype=np.intp)
-    yes = can_switch(first.take(i), second.take(j))
+    yes = meet(first, second, i, j).exist
     return first.row[i[yes]], second.row[j[yes]]
 
 

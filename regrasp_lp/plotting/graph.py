@@ -122,7 +122,8 @@ def _listed(graph: SwitchingGraph) -> IntArray:
     """The pairs of sets that have to hold contacts in common and can, shape (K, 2)."""
     need, contacts = graph.hand.needs, graph.sets.contacts
     chunks = [np.zeros((0, 2), dtype=np.intp)]
-    for i, j, _ in graph.switches.pairs():
+    for pairs in graph.switches.pairs():
+        i, j = pairs.first, pairs.second
         holds = need[contacts[i], contacts[j]] > 0
         chunks.append(np.unique(np.stack((i[holds], j[holds]), axis=1), axis=0))
     return np.asarray(np.unique(np.concatenate(chunks), axis=0))
