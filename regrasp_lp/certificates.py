@@ -16,7 +16,7 @@ from pathlib import Path
 
 import numpy as np
 
-from regrasp_lp.certification import certify, check_provable, contact_rule_of, existence
+from regrasp_lp.certification import certify, contact_rule_of, existence
 from regrasp_lp.completion import complete, complete_exactly
 from regrasp_lp.contact_rule import joined_optima
 from regrasp_lp.errors import SolverError
@@ -59,7 +59,6 @@ def save_certificates(graph: SwitchingGraph, path: str | Path) -> None:
     SolverError
         If the graph says what is not so: there is no proof of that (`certify` lists it).
     """
-    check_provable(graph)
     report = certify(graph)
     if not report.ok:
         raise SolverError(

@@ -119,21 +119,21 @@ def certify(graph: SwitchingGraph) -> Certification:
     >>> report.ok, report.sets["three_finger"].yes
     (True, 8)
     """
-    check_provable(graph)
+    check_provable(graph.options.switching, graph.options.min_margin)
     return _Comparison(graph).report()
 
 
-def check_provable(graph: SwitchingGraph) -> None:
-    """Raise OptionError if there are no certificates for the decisions behind a graph."""
-    if graph.options.switching != "contact":
+def check_provable(switching: str, min_margin: float) -> None:
+    """Raise OptionError if there are no certificates for graphs with such options."""
+    if switching != "contact":
         raise OptionError(
-            f'certificates are for switching="contact", and this graph has switching='
-            f'"{graph.options.switching}": build it with the contact rule'
+            f'certificates are for switching="contact", not for switching="{switching}": '
+            "build the graph with the contact rule"
         )
-    if graph.options.min_margin != 0:
+    if min_margin != 0:
         raise OptionError(
-            f"certificates are for min_margin=0, and this graph has min_margin="
-            f"{graph.options.min_margin:g}: build it without a margin"
+            f"certificates are for min_margin=0, not for min_margin={min_margin:g}: build the "
+            "graph without a margin"
         )
 
 

@@ -873,6 +873,12 @@ def located(number: int, line: bytes, step: Callable[[], T]) -> T:
         raise Rejected(f"line {number}: {_shown(line.strip())}: nested too deeply") from None
 
 
+def is_certificates(path: str | Path) -> bool:
+    """Whether a file begins as one of certificates does, right or wrong."""
+    with open(path, "rb") as file:
+        return b"regrasp-certificates" in file.read(100).partition(b"\n")[0]
+
+
 def main(arguments: Sequence[str] | None = None) -> int:
     """Check the files named on the command line; print a verdict on each.
 

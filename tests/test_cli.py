@@ -612,6 +612,38 @@ def test_graph_by_the_rule_of_the_chapter(run: Run) -> None:
     assert_one_line(err)
 
 
+def test_certificates_of_a_graph(run: Run) -> None:
+    common = ["graph", "parts.geojson", "--name", "hex_nut", "--friction", "0.2"]
+    code, out, err = run(*common, "--certificates", "nut.proof")
+    assert (code, err) == (0, "")
+    assert out.endswith("wrote nut.proof\n")
+    code, out, err = run("check", "nut.proof")
+    assert (code, err) == (0, "")
+    assert out.startswith("nut.proof: accepted: 'hex_nut', 18 edges")
+    content = Path("nut.proof").read_bytes()
+    Path("nut.proof").write_bytes(content.replace(b'"yes"', b'"no" ', 1))
+    code, out, err = run("check", "nut.proof")
+    assert (code, err) == (1, "")
+    assert out.startswith("nut.proof: rejected: line 1:")
+
+
+@pytest.mark.parametrize(
+    ("options", "message"),
+    [
+        (["--sets", "chapter", "--switching", "focus"], 'switching="contact"'),
+        (["--min-margin", "1"], "min_margin=0"),
+        (["--save", "nut.proof"], "cannot be written twice"),
+    ],
+)
+def test_graphs_without_certificates(run: Run, options: list[str], message: str) -> None:
+    common = ["graph", "parts.geojson", "--name", "hex_nut", "--friction", "0.2"]
+    code, out, err = run(*common, *options, "--certificates", "nut.proof")
+    assert (code, out) == (2, "")
+    assert_one_line(err)
+    assert message in err
+    assert not Path("nut.proof").exists()
+
+
 # --- table --------------------------------------------------------------------------------------
 
 SQUARES = [f"POLYGON ((0 0, {n} 0, {n} {n}, 0 {n}, 0 0))" for n in (1, 2)]

@@ -65,7 +65,9 @@ _GRAPH_EXAMPLES = """\
 examples:
   regrasp-lp graph parts.geojson --friction 0.2
   regrasp-lp graph parts.geojson --name hex_nut --friction 0.2 --sets chapter
-  regrasp-lp graph parts.geojson --name hex_nut --friction 0.2 --save nut.npz"""
+  regrasp-lp graph parts.geojson --name hex_nut --friction 0.2 --save nut.npz
+  regrasp-lp graph parts.geojson --name hex_nut --friction 0.2 \\
+    --certificates nut.proof"""
 
 _TABLE = """\
 Compute the graphs of many polygons and put their numbers into one table: for
@@ -102,16 +104,20 @@ Verify a plan file, written by `plan --json` or by any other program. In exact
 rational arithmetic, and with no code of the planner, its steps are carried out
 one by one: the fingers that touch have to hold the object in force closure
 before and after each step and at every instant of a slide, no two fingers may
-meet, and the goal has to be reached."""
+meet, and the goal has to be reached.
+
+Or verify the certificates that `graph --certificates` wrote: every candidate
+and every pair of grasp sets is found anew, and its proof looked at."""
 
 _CHECK_EXAMPLES = """\
 examples:
   regrasp-lp check plan.json
+  regrasp-lp check nut.proof
 
 exit codes:
-  0  the plan is good
-  1  the plan is faulty: its first fault is printed
-  2  an error: the file cannot be read, or is no plan"""
+  0  the plan is good, the certificates are accepted
+  1  the plan is faulty, the certificates are rejected: the fault is printed
+  2  an error: the file cannot be read, or is neither"""
 
 
 class UsageError(OptionError):
@@ -184,8 +190,8 @@ def build_parser() -> argparse.ArgumentParser:
     _add_graph(command("graph", "summarise all grasps and switches", _GRAPH, _GRAPH_EXAMPLES))
     _add_table(command("table", "tabulate the graphs of many polygons", _TABLE, _TABLE_EXAMPLES))
     _add_show(command("show", "draw an object with its edge numbers", _SHOW, _SHOW_EXAMPLES))
-    check = command("check", "verify a plan file exactly", _CHECK, _CHECK_EXAMPLES)
-    check.add_argument("file", metavar="PLAN.json", help="the plan file")
+    check = command("check", "verify a plan or a proof exactly", _CHECK, _CHECK_EXAMPLES)
+    check.add_argument("file", metavar="FILE", help="the plan file, or the certificates")
     return parser
 
 
@@ -229,6 +235,7 @@ def _add_graph(parser: argparse.ArgumentParser) -> None:
     )
     files = parser.add_argument_group("files to write")
     _add_output(files, "--save", values.output_file, "the graph, for regrasp_lp.load_graph")
+    _add_output(files, "--certificates", values.output_file, "a proof of it, for `check`")
 
 
 def _add_table(parser: argparse.ArgumentParser) -> None:

@@ -14,6 +14,9 @@ from typing import TYPE_CHECKING, Any
 
 import regrasp_lp
 from regrasp_lp import Grasp, Hand, Plan, Polygon, SwitchingGraph
+from regrasp_lp.certification import check_provable
+from regrasp_lp.check_certificates import is_certificates
+from regrasp_lp.check_certificates import main as check_certificates
 from regrasp_lp.cli.arguments import PROGRAM
 from regrasp_lp.cli.far_apart import far_apart
 from regrasp_lp.cli.progress import ProgressBar, complain
@@ -109,10 +112,14 @@ def _built(
 
 def graph(options: Namespace) -> int:
     """Print the summary of one or several graphs."""
-    _check_outputs(options.file, options.save)
+    _check_outputs(options.file, options.save, options.certificates)
     polygons = _polygons(options.file, options.name)
-    if options.save and len(polygons) > 1:
-        raise OptionError(f"--save takes one graph, but {_several(options.file, polygons)}")
+    if options.certificates:
+        check_provable(options.switching, options.min_margin)
+    for option in ("save", "certificates"):
+        if getattr(options, option) and len(polygons) > 1:
+            several = _several(options.file, polygons)
+            raise OptionError(f"--{option} takes one graph, but {several}")
     for number, polygon in enumerate(polygons):
         friction = _friction(polygon, options.friction)
         with ProgressBar() as bar:
@@ -125,6 +132,9 @@ def graph(options: Namespace) -> int:
         if options.save:
             with _writing(options.save):
                 built.save(options.save)
+        if options.certificates:
+            with _writing(options.certificates):
+                built.save_certificates(options.certificates)
     return 0
 
 
@@ -187,8 +197,10 @@ def show(options: Namespace) -> int:
 
 
 def check(options: Namespace) -> int:
-    """Verify a plan file."""
+    """Verify a plan file, or a file of certificates."""
     try:
+        if is_certificates(options.file):
+            return check_certificates([options.file])
         report = regrasp_lp.check_plan(options.file)
     except RegraspError as error:
         text = str(error)
