@@ -63,8 +63,8 @@ def build_switching_graph(
         switch is the margin of its grasps, also under the focus rule.
     solver : {"clarabel", "highs"}
     presolve : bool
-        Decide by signs of torque functions and intervals (exact), and let the solver find margins
-        and witnesses; if False, decide everything by margin LPs.
+        Decide by signs of torque functions and intervals (exact), and solve the margin LPs of sets
+        in closed form; if False, leave everything to the solver.
     progress : callable, optional
         Called as ``progress(what, done, total)`` now and then.
 

@@ -875,7 +875,7 @@ def located(number: int, line: bytes, step: Callable[[], T]) -> T:
 
 def is_certificates(path: str | Path) -> bool:
     """Whether a file begins as one of certificates does, right or wrong."""
-    with open(path, "rb") as file:
+    with Path(path).open("rb") as file:
         return b"regrasp-certificates" in file.read(100).partition(b"\n")[0]
 
 

@@ -10,14 +10,15 @@ from __future__ import annotations
 from collections.abc import Iterator
 from fractions import Fraction
 from itertools import permutations, product
+from typing import NamedTuple
 
 import numpy as np
 
 from regrasp_lp.exact_margins import is_larger, piece_rows, scaled_functions
-from regrasp_lp.friction import IntArray
+from regrasp_lp.friction import IntArray, ObjectArray
 from regrasp_lp.joins import best_joins, possible_joins
 from regrasp_lp.lp import Solver
-from regrasp_lp.lp.exact_lp import ExactSolution, exact_margin
+from regrasp_lp.lp.exact_solver import exact_optimum
 from regrasp_lp.shadows import Shadows
 from regrasp_lp.switching import Meeting, meet
 
@@ -107,9 +108,16 @@ def meet_by_lp(
     return found
 
 
+class JoinOptimum(NamedTuple):
+    """The optimum of the margin LP of two joined pieces, in rational numbers."""
+
+    margin: Fraction
+    point: tuple[Fraction, ...]
+
+
 def joined_optima(
     first: Shadows, second: Shadows, pieces: IntArray | None = None
-) -> Iterator[ExactSolution]:
+) -> Iterator[JoinOptimum]:
     """Yield the optimum of joins of a piece of one set and a piece of another, exactly.
 
     Parameters
@@ -136,7 +144,15 @@ def joined_optima(
     for j, k, j2, k2 in pieces.tolist():
         rows, bounds = piece_rows(*functions[0], j, k)
         more, limits = piece_rows(*functions[1], j2, k2)
-        yield exact_margin(rows + more, bounds + limits)
+        yield _optimum(np.array(rows + more), np.array(bounds + limits))
+
+
+def _optimum(rows: ObjectArray, bounds: ObjectArray) -> JoinOptimum:
+    r, n = rows.shape
+    one = np.array([Fraction(1)] * max(r, n))
+    found = exact_optimum(rows, one[:r], bounds, one[:n])
+    assert found is not None  # every row has a scale
+    return JoinOptimum((bounds - rows.dot(found[0])).min(), tuple(found[0]))
 
 
 def _spread(slope: list[Fraction], where: list[int], n: int) -> list[Fraction]:

@@ -116,7 +116,7 @@ def _piece_margin(
 def piece_rows(
     constants: Sequence[Fraction], slopes: Sequence[Sequence[Fraction]], j: int, k: int
 ) -> tuple[list[list[Fraction]], list[Fraction]]:
-    """Return rows and bounds of the piece ``{M_j < 0 < M_k}``, for `exact_margin`."""
+    """Return rows and bounds of the piece ``{M_j < 0 < M_k}``, with scales of 1."""
     rows = [list(slopes[j]), [-slope for slope in slopes[k]]]
     return rows, [-constants[j], constants[k]]
 

@@ -10,7 +10,9 @@ It has two rows, so one multiplier y in [0, 1] solves it: with ``M_k/s_k = α + 
     ε* = min over y of  y α - (1 - y) β + Σ_i max(0, y a_i - (1 - y) b_i) ,
 
 convex and piecewise linear in y, with its breakpoints at ``y_i = b_i / (a_i + b_i)``. The least
-value over 0, 1 and the breakpoints is the optimum: all pieces of all sets at once.
+value over 0, 1 and the breakpoints is the optimum: all pieces of all sets at once. The multiplier
+y tells where the optimum is attained, too: a contact is at 1 where ``y a_i > (1 - y) b_i``, at 0
+where it is less, and those in between are where both rows are tight.
 """
 
 from __future__ import annotations
@@ -22,6 +24,7 @@ from regrasp_lp.friction import FloatArray, IntArray
 from regrasp_lp.torque import TorqueFunctions
 
 _CHUNK = 20_000
+_TIED = 1e-12  # of the slopes: contacts that make the same difference, but for rounding
 
 
 def piece_margins(functions: TorqueFunctions) -> FloatArray:
@@ -82,6 +85,48 @@ def best_pieces(functions: TorqueFunctions) -> tuple[FloatArray, IntArray]:
     if not margins:
         return np.zeros(0), np.zeros((0, 2), dtype=np.intp)
     return np.concatenate(margins), np.concatenate(pieces).astype(np.intp)
+
+
+def best_points(functions: TorqueFunctions, pieces: IntArray) -> FloatArray:
+    """Return where the margin on one piece of every set is largest.
+
+    Parameters
+    ----------
+    functions : TorqueFunctions
+    pieces : numpy.ndarray of int, shape (N, 2)
+        The functions j and k.
+
+    Returns
+    -------
+    numpy.ndarray, shape (N, m)
+        Fractions. Contacts that make no difference are in the middle of their edges, those that
+        make the same difference at the same fraction.
+    """
+    every = np.arange(len(functions))
+    j, k = pieces.T
+    alpha, a = functions.offsets[every, k], functions.slopes[every, k]
+    beta, b = functions.offsets[every, j], functions.slopes[every, j]
+    both = a + b
+    moves = both > 0
+    ends = np.divide(b, both, out=np.zeros(b.shape), where=moves)
+    y = np.pad(ends, ((0, 0), (2, 0)))
+    y[:, 1] = 1.0
+    lift = y[:, :, None] * a[:, None, :] - (1 - y[:, :, None]) * b[:, None, :]
+    value = y * alpha[:, None] - (1 - y) * beta[:, None] + np.maximum(lift, 0.0).sum(axis=2)
+    best = value.argmin(axis=1)
+    lift = lift[every, best]
+    tied = moves & (np.abs(lift) <= _TIED * both)
+    fractions = np.where(moves, (lift > 0).astype(float), 0.5)
+    # At the ends of y one row is slack: a contact that only the other moves is best at its side.
+    at_end = best < 2
+    side = np.where(best == 0, 1.0, 0.0)[:, None]
+    fractions = np.where(at_end[:, None] & tied, side, fractions)
+    tied &= ~at_end[:, None]
+    rest = np.where(tied, 0.0, fractions)
+    excess = alpha + beta + (both * rest).sum(axis=1)
+    slope = np.where(tied, both, 0.0).sum(axis=1)
+    shared = np.divide(-excess, slope, out=np.zeros(len(every)), where=slope > 0)
+    return np.where(tied, np.clip(shared, 0.0, 1.0)[:, None], fractions)
 
 
 def existing_pieces(functions: TorqueFunctions) -> NDArray[np.intp]:

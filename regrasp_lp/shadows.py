@@ -22,7 +22,7 @@ from numpy.typing import NDArray
 from regrasp_lp.friction import UNIT_ROUNDOFF, BoolArray, FloatArray, IntArray
 from regrasp_lp.torque import TorqueFunctions
 
-GRID = np.linspace(0.0, 1.0, 9)
+GRID = np.linspace(0.0, 1.0, 3)
 """Positions of the first of two held contacts at which `Shadows.on_grid` looks."""
 
 _QUOTIENT = 8 * UNIT_ROUNDOFF
@@ -126,7 +126,7 @@ class Shadows:
 
     @cached_property
     def on_grid(self) -> tuple[FloatArray, FloatArray]:
-        """Inner `limits` with the first of two held contacts on `GRID`, (R, 9) each."""
+        """Inner `limits` with the first of two held contacts on `GRID`, (R, 3) each."""
         columns = [self.limits(x) for x in (GRID if self.held > 1 else GRID[:1])]
         lower, upper = (np.stack(end, axis=1) for end in zip(*columns, strict=True))
         return lower, upper
@@ -222,14 +222,19 @@ def _project(
     slopes = functions.slopes[rows]
     low = functions.offsets[rows]
     high = low + slopes[:, :, others].sum(axis=2)
-    pad = ((0, 0), (0, width - low.shape[1]))
+    columns = (low, high, slopes[:, :, list(slots)], functions.errors[rows], functions.valid[rows])
     return (
         np.full(len(rows), number, dtype=np.intp),
         rows,
         np.tile(np.array(slots, dtype=np.intp), (len(rows), 1)),
-        np.pad(low, pad),
-        np.pad(high, pad),
-        np.pad(slopes[:, :, list(slots)], (*pad, (0, 0))),
-        np.pad(functions.errors[rows], pad),
-        np.pad(functions.valid[rows], pad),
+        *(_widened(column, width) for column in columns),
     )
+
+
+def _widened(array: NDArray[np.generic], width: int) -> NDArray[np.generic]:
+    """Columns of zeros at the end, up to a width (`numpy.pad` takes long over small arrays)."""
+    if array.shape[1] == width:
+        return array
+    wide = np.zeros((len(array), width, *array.shape[2:]), dtype=array.dtype)
+    wide[:, : array.shape[1]] = array
+    return wide

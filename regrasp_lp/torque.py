@@ -142,7 +142,7 @@ class TorqueFunctions:
         """Return the functions of some of the combinations."""
         kept = self.ray[rows]
         width = int((kept[:, :, 0] >= 0).sum(axis=1).max(initial=1))
-        return TorqueFunctions(
+        taken = TorqueFunctions(
             self.cones,
             self.edges[rows],
             self.spans[rows],
@@ -151,6 +151,9 @@ class TorqueFunctions:
             self.weight[rows][:, :width],
             self.scale[rows][:, :width],
         )
+        if "_terms" in vars(self):  # what is known already
+            vars(taken)["_terms"] = tuple(term[rows][:, :width] for term in self._terms)
+        return taken
 
     def values(self, fractions: FloatArray) -> FloatArray:
         """Return ``M(f) / s`` of every function.

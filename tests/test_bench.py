@@ -131,7 +131,7 @@ def test_parts_of_the_time_add_up() -> None:
     seconds, total = where.parts_of(build_small)
     assert tuple(seconds) == where.PARTS
     assert min(seconds.values()) >= 0
-    assert seconds["solver"] > 0
+    assert min(seconds[part] for part in ("candidates", "functions", "presolve", "graph")) > 0
     assert sum(seconds.values()) == pytest.approx(total, rel=1e-2, abs=1e-4)
 
 

@@ -375,7 +375,7 @@ FOCUS = ["table", "parts.geojson", "--switching", "focus"]
         (["graph", "parts.geojson"], "required: --friction"),
         (["table"], "required: PATH"),
         (["show"], "required: FILE"),
-        (["check"], "required: PLAN.json"),
+        (["check"], "required: FILE"),
         ([*RECTANGLE, "--frobnicate"], "unrecognized arguments: --frobnicate"),
         ([*RECTANGLE, "--tol", "1"], "unrecognized arguments: --tol 1"),
         ([*RECTANGLE, "--start"], "argument --start: expected one argument"),

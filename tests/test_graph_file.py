@@ -229,7 +229,6 @@ def test_other_files(tmp_path: Path) -> None:
         {"header": {"name": 3}},
         {"header": {"seconds": None}},
     ],
-    ids=str,
 )
 def test_damaged_content(saved: Path, changes: dict[str, object]) -> None:
     rewrite(saved, **changes)

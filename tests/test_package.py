@@ -23,7 +23,7 @@ contact  rings  ring_checks  polygon  wkt  files
 friction  wrenches  force_closure  random_grasps
 circuits  torque  margins
 linear_sets
-lp.solver  lp.ladder  lp.exact_lp  lp.margin_lp  lp.highs_solver  lp.clarabel_solver  lp.exact_solver  lp
+lp.solver  lp.ladder  lp.margin_lp  lp.highs_solver  lp.clarabel_solver  lp.exact_solver  lp
 exact_margins  polytopes
 grasp_sets  grasp_sets.candidates  grasp_sets.families  grasp_sets.pieces  grasp_sets.vertices
 grasp_sets.sweeps  grasp_sets.focus  grasp_sets.double_cones  grasp_sets.parallel

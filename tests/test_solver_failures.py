@@ -381,12 +381,15 @@ def test_a_status_that_lies(
 
 
 @pytest.mark.parametrize("name", SOLVERS)
-@pytest.mark.parametrize("presolve", [True, False])
+@pytest.mark.parametrize("options", [{"presolve": False}, {"min_margin": 0.01}])
 def test_a_graph_built_by_a_failing_solver_is_the_same(
-    name: str, presolve: bool, caplog: pytest.LogCaptureFixture, monkeypatch: pytest.MonkeyPatch
+    name: str,
+    options: dict[str, Any],
+    caplog: pytest.LogCaptureFixture,
+    monkeypatch: pytest.MonkeyPatch,
 ) -> None:
     polygon = star(6, 3)
-    sound = rl.build_switching_graph(polygon, 0.3, solver=name, presolve=presolve)
+    sound = rl.build_switching_graph(polygon, 0.3, solver=name, **options)
     assert reports(caplog) == []
     solvers = {"clarabel": ClarabelSolver, "highs": HighsSolver}
     original, calls = solvers[name].solve, []
@@ -398,7 +401,7 @@ def test_a_graph_built_by_a_failing_solver_is_the_same(
         return original(self, sets, thorough=thorough)
 
     monkeypatch.setattr(solvers[name], "solve", unsteady)
-    other = rl.build_switching_graph(polygon, 0.3, solver=name, presolve=presolve)
+    other = rl.build_switching_graph(polygon, 0.3, solver=name, **options)
     assert len(reports(caplog)) > 0
     assert [s.edges for s in other.sets] == [s.edges for s in sound.sets]
     np.testing.assert_allclose(other.sets.margins, sound.sets.margins, atol=1e-9)

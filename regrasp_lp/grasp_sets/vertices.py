@@ -9,7 +9,7 @@ from itertools import permutations
 
 import numpy as np
 
-from regrasp_lp.errors import OptionError, SolverError
+from regrasp_lp.errors import OptionError
 from regrasp_lp.exact_margins import certain_margins, exceeds
 from regrasp_lp.friction import BoolArray, Cones, FloatArray, IntArray
 from regrasp_lp.grasp_sets.candidates import (
@@ -21,7 +21,7 @@ from regrasp_lp.grasp_sets.candidates import (
 from regrasp_lp.grasp_sets.families import parallel_functions
 from regrasp_lp.grasp_sets.pieces import piece_sets
 from regrasp_lp.lp import GAP, MarginSolutions, Solver, maximise_margins
-from regrasp_lp.margins import best_pieces
+from regrasp_lp.margins import best_pieces, best_points
 from regrasp_lp.torque import TorqueFunctions, torque_functions
 
 Progress = Callable[[str, int, int], None]
@@ -100,10 +100,10 @@ def build_family(
 ) -> Family:
     """Return all existing grasp sets of one kind.
 
-    With `presolve` the signs of torque functions at two corners decide which sets exist, and a
-    closed form gives the margin of each and the piece that attains it; the solver confirms the
-    margin and finds the witness. Without it the solver maximises the margin of every piece of every
-    candidate.
+    With `presolve` the signs of torque functions at two corners decide which sets exist, and the
+    margin LPs are solved in closed form, primal and dual: that both agree proves the optimum, and
+    what did not agree would be left to the solver. Without it the solver maximises the margin of
+    every piece of every candidate.
 
     Parameters
     ----------
@@ -151,44 +151,51 @@ def solve_family(
     n_candidates = len(functions)
     kept = np.flatnonzero(functions.exists() if presolve else functions.spans)
     functions, centers = functions.take(kept), centers[kept]
-    if presolve:
-        closed, best = best_pieces(functions)
-        chosen = np.column_stack((np.arange(len(functions)), best))
-    else:
-        chosen = _all_pieces(functions)
 
-    def tell(done: int) -> None:
+    def tell(done: int, total: int) -> None:
         if progress is not None:
-            progress(f"{kind} margins", done, len(chosen))
+            progress(f"{kind} margins", done, total)
 
-    names = [f"f{i}" for i in range(functions.m)]
-    solutions = maximise_margins(piece_sets(functions, chosen, names), solver, tell)
-    margins, witnesses, exists = _best_of_each(len(functions), functions.m, chosen, solutions)
     if presolve:
-        _confirm(closed, solutions, solver)
-        margins = certain_margins(functions, closed, best)
-        exists = np.ones(len(functions), dtype=bool)
+        margins, witnesses = _in_closed_form(functions, solver)
+        exists = exceeds(functions, margins, min_margin) if min_margin > 0 else functions.spans
+        tell(len(functions), len(functions))
+    else:
+        margins, witnesses, positive = _by_programs(functions, solver, tell)
+        exists = positive & (margins > min_margin)
     witnesses = _off_corners(functions, _inside(functions, _spread(functions, witnesses)))
-    if min_margin > 0:
-        exists &= exceeds(functions, margins, min_margin) if presolve else margins > min_margin
     kept = np.flatnonzero(exists)
     return Family(
         kind, functions.take(kept), centers[kept], margins[kept], witnesses[kept], n_candidates
     )
 
 
-def _confirm(closed: FloatArray, solutions: MarginSolutions, solver: Solver) -> None:
-    """Check the margins of a closed form against the two bounds that a solver's answers gave."""
-    slack = GAP * solutions.units
-    apart = (closed < solutions.margins - slack) | (closed > solutions.bounds + slack)
-    if apart.any():
-        worst = int(np.abs(closed - solutions.margins)[apart].argmax())
-        raise SolverError(
-            f"{np.count_nonzero(apart)} of {len(closed)} margins of grasp sets in closed form are "
-            f"outside the bounds from {solver.name} (the worst: {closed[apart][worst]:.9g}, "
-            f"{solver.name} {solutions.margins[apart][worst]:.9g}): try the other solver, or "
-            "presolve=False"
-        )
+def _in_closed_form(functions: TorqueFunctions, solver: Solver) -> tuple[FloatArray, FloatArray]:
+    """Margins of existing sets and grasps that attain them; by the solver where they do not."""
+    closed, pieces = best_pieces(functions)
+    witnesses = best_points(functions, pieces)
+    values, every = functions.values(witnesses), np.arange(len(functions))
+    attained = np.minimum(values[every, pieces[:, 1]], -values[every, pieces[:, 0]])
+    # The closed form is the optimum of the dual, so that a point that attains it is optimal.
+    short = np.flatnonzero(attained < closed - GAP * functions.cones.size)
+    margins = certain_margins(functions, closed, pieces)
+    if short.size:
+        margins[short], witnesses[short], _ = _by_programs(functions.take(short), solver)
+    return margins, witnesses
+
+
+def _by_programs(
+    functions: TorqueFunctions, solver: Solver, tell: Callable[[int, int], None] | None = None
+) -> tuple[FloatArray, FloatArray, BoolArray]:
+    """Margins, grasps that attain them and whether they are positive, by LPs on all pieces."""
+    chosen = _all_pieces(functions)
+    names = [f"f{i}" for i in range(functions.m)]
+    solutions = maximise_margins(
+        piece_sets(functions, chosen, names),
+        solver,
+        None if tell is None else lambda done: tell(done, len(chosen)),
+    )
+    return _best_of_each(len(functions), functions.m, chosen, solutions)
 
 
 def _all_pieces(functions: TorqueFunctions) -> IntArray:

@@ -50,14 +50,41 @@ def _solve_one(sets: LinearSets, stricter: Fraction) -> tuple[ObjectArray, Objec
     size = abs(rows).sum(axis=1) + abs(bounds)
     unscaled = np.flatnonzero(sets.scales[0] == 0)
     bounds[unscaled] = bounds[unscaled] - stricter * size[unscaled]
-    r, n = rows.shape
-    usable = np.flatnonzero(sets.scales[0] > 0)
-    if not usable.size or (upper < lower).any():
+    if not (sets.scales[0] > 0).any() or (upper < lower).any():
         return None
-    costs = np.concatenate((bounds, upper - lower, _fractions(np.zeros(n + 1))))
-    table = _first_table(rows, scales, int(usable[0]))
+    found = exact_optimum(rows, scales, bounds, upper - lower)
+    return None if found is None else (lower + found[0], found[1])
+
+
+def exact_optimum(
+    rows: ObjectArray, scales: ObjectArray, bounds: ObjectArray, upper: ObjectArray
+) -> tuple[ObjectArray, ObjectArray] | None:
+    """Solve ``max ε  s.t.  rows x + scales ε <= bounds, 0 <= x <= upper`` in rational numbers.
+
+    Parameters
+    ----------
+    rows : numpy.ndarray of object (Fraction), shape (R, n)
+    scales, bounds : numpy.ndarray of object (Fraction), shape (R,)
+        At least one scale is positive.
+    upper : numpy.ndarray of object (Fraction), shape (n,)
+
+    Returns
+    -------
+    point, multipliers : numpy.ndarray of object (Fraction), shapes (n,) and (R,)
+        Or None if rows of scale 0 contradict each other.
+
+    Examples
+    --------
+    >>> rows, ones = np.array([[Fraction(1)], [Fraction(-1)]]), np.array([Fraction(1)] * 2)
+    >>> exact_optimum(rows, ones, np.array([Fraction(1), Fraction(0)]), ones[:1])[0]
+    array([Fraction(1, 2)], dtype=object)
+    """
+    r, n = rows.shape
+    start = int(np.flatnonzero(scales > 0)[0])
+    costs = np.concatenate((bounds, upper, _fractions(np.zeros(n + 1))))
+    table = _first_table(rows, scales, start)
     basis = np.array([r + i if table[i, r + i] == 1 else r + n + i for i in range(n)])
-    basis = np.append(basis, usable[0])
+    basis = np.append(basis, start)
     reduced = costs - costs[basis].dot(table)
     while (entering := np.flatnonzero(reduced[:-1] < 0)).size:
         column = int(entering[0])
@@ -76,7 +103,7 @@ def _solve_one(sets: LinearSets, stricter: Fraction) -> tuple[ObjectArray, Objec
     multipliers = _fractions(np.zeros(r + 2 * n))
     multipliers[basis] = table[:, -1]
     # The reduced cost of t is the multiplier of its row, a coordinate of the point.
-    return lower + reduced[r + n : r + 2 * n], multipliers[:r]
+    return reduced[r + n : r + 2 * n], multipliers[:r]
 
 
 def _first_table(rows: ObjectArray, scales: ObjectArray, start: int) -> ObjectArray:

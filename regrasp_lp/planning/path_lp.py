@@ -8,6 +8,7 @@ maximised; then, holding it, the travel ``Σ |u' - u|`` is minimised.
 
 from __future__ import annotations
 
+import logging
 from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
@@ -17,10 +18,13 @@ import numpy as np
 from regrasp_lp.errors import SolverError
 from regrasp_lp.friction import FloatArray, IntArray
 from regrasp_lp.grasp_sets.pieces import piece_sets
+from regrasp_lp.lp.solver import NAMES
 from regrasp_lp.torque import TorqueFunctions
 
 if TYPE_CHECKING:
     from scipy.sparse import csr_matrix
+
+_LOG = logging.getLogger("regrasp_lp")
 
 _KEEP = 1e-6
 """Part of the tolerance that may be given up for travel, against rounding."""
@@ -156,7 +160,7 @@ def solve_path_problem(problem: PathProblem, solver: str) -> list[FloatArray]:
     Raises
     ------
     SolverError
-        If a solver stopped early.
+        If both solvers failed.
     """
     import cvxpy as cp
 
@@ -180,21 +184,28 @@ def solve_path_problem(problem: PathProblem, solver: str) -> list[FloatArray]:
 
 
 def _solve(problem: object, solver: str) -> None:
+    """Solve by one solver, or by the other one where that fails."""
     import cvxpy as cp
 
     assert isinstance(problem, cp.Problem)
-    options = {}
-    if solver == "highs":
-        options = {"primal_feasibility_tolerance": 1e-10, "dual_feasibility_tolerance": 1e-10}
-    try:
-        problem.solve(solver=cp.CLARABEL if solver == "clarabel" else cp.HIGHS, **options)
-    except cp.SolverError as error:
-        raise SolverError(f"{solver} failed on the path LP: {error}") from error
-    if problem.status != cp.OPTIMAL:
-        raise SolverError(
-            f"{solver} stopped on the path LP with status {problem.status!r}: neither yes nor no; "
-            "try the other solver"
-        )
+    failures = []
+    for name in dict.fromkeys((solver, *NAMES)):
+        options = {}
+        if name == "highs":
+            options = {"primal_feasibility_tolerance": 1e-10, "dual_feasibility_tolerance": 1e-10}
+        try:
+            problem.solve(solver=cp.CLARABEL if name == "clarabel" else cp.HIGHS, **options)
+        except (KeyboardInterrupt, SystemExit, GeneratorExit):
+            raise
+        except BaseException as error:  # a panic of a solver written in Rust is no Exception
+            failures.append(f"{name} raised {type(error).__name__}: {error}")
+            continue
+        if problem.status == cp.OPTIMAL:
+            if failures:
+                _LOG.warning("path LP solved by %s: %s", name, "; ".join(failures))
+            return
+        failures.append(f"{name} stopped with status {problem.status!r}")
+    raise SolverError(f"the path LP is open, neither yes nor no: {'; '.join(failures)}")
 
 
 def _merge(problem: PathProblem, x: FloatArray) -> FloatArray:

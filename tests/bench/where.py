@@ -39,6 +39,7 @@ ENTRIES = {
     "torque:TorqueFunctions.exists": "presolve",
     "torque:TorqueFunctions.contain": "presolve",
     "margins:best_pieces": "presolve",
+    "margins:best_points": "presolve",
     "switching:meet": "presolve",
     "grasp_sets.pieces:piece_sets": "solver",
     "lp.margin_lp:maximise_margins": "solver",
