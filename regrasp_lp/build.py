@@ -30,6 +30,9 @@ from regrasp_lp.switches import (
 from regrasp_lp.switching import Meeting
 from regrasp_lp.switching_graph import GraphOptions, SwitchingGraph
 
+_SMALL = 16
+"""Up to so many edges the whole graph is found as fast as a path without it."""
+
 
 def build_switching_graph(
     polygon: Polygon,
@@ -203,8 +206,8 @@ def plan_regrasp(
     """Return a verified plan with the fewest placements from one grasp to another.
 
     With complete sets and four fingers only the neighbourhoods of start and goal are looked at, so
-    that objects with hundreds of edges take no longer than small ones; otherwise, and to explain
-    why there is no plan, the whole graph is built.
+    that objects with hundreds of edges take little longer than small ones; otherwise, for objects
+    so small that it takes no longer, and to explain why there is no plan, the whole graph is built.
 
     Parameters
     ----------
@@ -230,7 +233,8 @@ def plan_regrasp(
         checked_grasp(polygon, grasp, cones.friction, hand, role)
         for role, grasp in (("start", start), ("goal", goal))
     )
-    if "three_finger" in kinds_of(sets) and hand == Hand(4):
+    large = polygon.n_edges > _SMALL
+    if large and "three_finger" in kinds_of(sets) and hand == Hand(4):
         problem = problem_on_demand(
             polygon,
             cones,
