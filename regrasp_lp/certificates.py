@@ -26,11 +26,11 @@ from regrasp_lp.shadows import Shadows
 from regrasp_lp.switching import (
     REASONS,
     bad_intervals,
+    certain_reasons,
     exact_bad_intervals,
     exact_one_held,
     exact_one_held_reason,
     exact_two_held,
-    one_held_reasons,
 )
 from regrasp_lp.switching_graph import SwitchingGraph
 from regrasp_lp.torque import TorqueFunctions
@@ -212,7 +212,7 @@ def _no(
 
 
 def _one_held(stack: Shadows, first: IntArray, second: IntArray) -> Iterator[object]:
-    reasons = one_held_reasons(stack.take(first), stack.take(second))
+    reasons = certain_reasons(stack.take(first), stack.take(second))
     for n, certain in enumerate(reasons):
         if certain.any():
             yield [[REASONS[int(certain.argmax())]]]

@@ -7,9 +7,9 @@ as equal.
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 from fractions import Fraction
-from math import isqrt
 
 import numpy as np
 
@@ -102,15 +102,19 @@ def largest_margin(functions: TorqueFunctions, row: int) -> Fraction:
 def _piece_margin(
     constants: Sequence[Fraction], slopes: Sequence[Sequence[Fraction]], j: int, k: int
 ) -> Fraction:
-    """The closed form of `margins` for one piece."""
-    zero, one = Fraction(0), Fraction(1)
-    ends = {b / (a + b) for a, b in zip(slopes[k], slopes[j], strict=True) if a + b}
+    """The closed form of `margins` for one piece, in integers over one denominator."""
+    numbers = [constants[k], constants[j], *slopes[k], *slopes[j]]
+    unit = math.lcm(*(v.denominator for v in numbers))
+    alpha, beta, *rises = (v.numerator * (unit // v.denominator) for v in numbers)
+    pairs = list(zip(rises[: len(slopes[k])], rises[len(slopes[k]) :], strict=True))
 
-    def value(y: Fraction) -> Fraction:
-        rises = (y * a - (1 - y) * b for a, b in zip(slopes[k], slopes[j], strict=True))
-        return y * constants[k] - (1 - y) * constants[j] + sum(max(zero, r) for r in rises)
+    def value(p: int, q: int) -> Fraction:
+        """At y = p / q."""
+        r = q - p
+        return Fraction(p * alpha - r * beta + sum(max(0, p * a - r * b) for a, b in pairs), q)
 
-    return min(value(y) for y in {zero, one, *ends})
+    breakpoints = [(b, a + b) for a, b in pairs if a + b]
+    return min(value(p, q) for p, q in [(0, 1), (1, 1), *breakpoints]) / unit
 
 
 def piece_rows(
@@ -178,4 +182,4 @@ def _length(cones: Cones, ray: int) -> Fraction:
     x, y = cones.exact_rays[ray]
     square = x * x + y * y
     shift = max(0, _BITS - square.bit_length() // 2)
-    return Fraction(isqrt(square << 2 * shift), 1 << shift)
+    return Fraction(math.isqrt(square << 2 * shift), 1 << shift)

@@ -133,27 +133,52 @@ def _between(low: FloatArray, high: FloatArray) -> tuple[BoolArray, FloatArray]:
 def _one_held(first: Shadows, second: Shadows) -> Meeting:
     """Pairs whose intervals do not meet for certain; in rational numbers if not even that."""
     result = Meeting.unknown(len(first), 1)
-    certain = one_held_reasons(first, second).any(axis=1)
+    certain = certain_reasons(first, second).any(axis=1)
     for n in np.flatnonzero(~certain).tolist():
         _write_exact(result, n, exact_one_held(first.exact(n), second.exact(n)))
     return result
 
 
-def one_held_reasons(first: Shadows, second: Shadows) -> BoolArray:
-    """Which of `REASONS` certainly keep aligned projections on one contact apart, (P, 6)."""
-    (u0, d0), (u1, d1) = (s.limits(inner=False) for s in (first, second))
+def certain_reasons(first: Shadows, second: Shadows, x: FloatArray | float = 0.0) -> BoolArray:
+    """Return which of `REASONS` certainly keep aligned projections apart, (P, 6).
+
+    Parameters
+    ----------
+    first, second : Shadows
+        On one held contact, or on two with the first one at x.
+    x : numpy.ndarray, shape (P,), or float
+    """
+    (u0, d0), (u1, d1) = (s.limits(x, inner=False) for s in (first, second))
     real = (d0 < np.inf) & (u1 > -np.inf), (d1 < np.inf) & (u0 > -np.inf)
     reasons = ((d0 <= u1) & real[0], (d1 <= u0) & real[1], d0 <= 0, u0 >= 1, d1 <= 0, u1 >= 1)
     return np.stack(reasons, axis=1)
 
 
 def _two_held(first: Shadows, second: Shadows) -> Meeting:
-    both = (first, second)
     result = Meeting.unknown(len(first), 2)
-    covered = _covered(bad_intervals(both))
-    for x in _gaps(bad_intervals(both, tighten=False)):
+    open_ = np.flatnonzero(~_bad_between_positions(first, second))
+    if open_.size:
+        result.write(open_, _by_intervals(first.take(open_), second.take(open_)))
+    return result
+
+
+def _bad_between_positions(first: Shadows, second: Shadows) -> BoolArray:
+    """Whether between any two neighbours of `GRID` one reason holds at both, hence in between."""
+    at = [certain_reasons(first, second, x) for x in GRID]
+    between = [(here & there).any(axis=1) for here, there in pairwise(at)]
+    return np.asarray(np.logical_and.reduce(between))
+
+
+def _by_intervals(first: Shadows, second: Shadows) -> Meeting:
+    """Bad intervals that leave a gap or not; in rational numbers if that does not decide."""
+    result = Meeting.unknown(len(first), 2)
+    bad = bad_intervals((first, second))
+    covered = _covered(bad)
+    for x in _gaps(bad):
         rest = np.flatnonzero(~covered & ~result.exist)
-        (low, high), (other_low, other_high) = (s.take(rest).limits(x[rest]) for s in both)
+        (low, high), (other_low, other_high) = (
+            s.take(rest).limits(x[rest]) for s in (first, second)
+        )
         yes, middle = _between(np.maximum(low, other_low), np.minimum(high, other_high))
         result.exist[rest] = yes
         result.points[rest[yes]] = np.stack((x[rest], middle), axis=1)[yes]
@@ -169,37 +194,33 @@ def _write_exact(result: Meeting, n: int, point: tuple[Fraction, ...] | None) ->
         result.points[n] = [float(x) for x in point]
 
 
-def bad_intervals(
-    both: tuple[Shadows, Shadows], tighten: bool = True
-) -> tuple[FloatArray, FloatArray]:
+def bad_intervals(both: tuple[Shadows, Shadows]) -> tuple[FloatArray, FloatArray]:
     """Return the bad intervals of x, shape (P, 6) each end; empty ones have their ends exchanged.
+
+    Every inequality is made stricter by its rounding error, so that what is called bad is bad.
 
     Parameters
     ----------
     both : tuple of two Shadows
         Aligned, on two held contacts.
-    tighten : bool
-        Whether every inequality is made stricter by its rounding error, so that what is called
-        bad is bad.
 
     Returns
     -------
     lower, upper : numpy.ndarray, shape (P, 6)
         One column for each of `REASONS`.
     """
-    factor = 1.0 if tighten else 0.0
     first, second = both
-    ends = [_root_order(first, second, factor), _root_order(second, first, factor)]
+    ends = [_root_order(first, second), _root_order(second, first)]
     for s in both:
         a, b = s.slopes[:, :, 0], s.slopes[:, :, 1]
-        error = 4 * factor * s.errors
+        error = 4 * s.errors
         ends.append(_half_lines(s.low - error, a, s.valid))  # δ <= 0
         ends.append(_half_lines(-(s.high + b) - error, -a, s.valid))  # υ >= 1
     lower, upper = (np.stack(end, axis=1) for end in zip(*ends, strict=True))
     return np.maximum(lower, 0.0), np.minimum(upper, 1.0)
 
 
-def _root_order(s: Shadows, t: Shadows, factor: float) -> tuple[FloatArray, FloatArray]:
+def _root_order(s: Shadows, t: Shadows) -> tuple[FloatArray, FloatArray]:
     """Where δ of s is at or below υ of t: all their roots in that order.
 
     ``root_j <= root_k`` is ``(l_j + a_j x) b_k >= (h_k + a_k x) b_j``; where a function does not
@@ -210,16 +231,15 @@ def _root_order(s: Shadows, t: Shadows, factor: float) -> tuple[FloatArray, Floa
     e_j, e_k = s.errors[:, :, None], t.errors[:, None, :]
     size_j, size_k = np.abs(low) + a_j + b_j, np.abs(high) + a_k + b_k
     error = 2 * (e_j * size_k + e_k * size_j) + 16 * UNIT_ROUNDOFF * size_j * size_k
-    constant = low * b_k - high * b_j - factor * error
+    constant = low * b_k - high * b_j - error
     slope = a_j * b_k - a_k * b_j
     depend = (b_j > 0) & (b_k > 0) & s.valid[:, :, None] & t.valid[:, None, :]
     flat = (len(s), low.shape[1] * high.shape[2])
     pairs = _half_lines(constant.reshape(flat), slope.reshape(flat), depend.reshape(flat))
     fixed_j = s.valid & (s.slopes[:, :, 1] == 0)
     fixed_k = t.valid & (t.slopes[:, :, 1] == 0)
-    error_j, error_k = 4 * factor * s.errors, 4 * factor * t.errors
-    left = _half_lines(s.low - error_j, s.slopes[:, :, 0], fixed_j)
-    right = _half_lines(-t.high - error_k, -t.slopes[:, :, 0], fixed_k)
+    left = _half_lines(s.low - 4 * s.errors, s.slopes[:, :, 0], fixed_j)
+    right = _half_lines(-t.high - 4 * t.errors, -t.slopes[:, :, 0], fixed_k)
     lower = np.maximum(np.maximum(pairs[0], left[0]), right[0])
     return lower, np.minimum(np.minimum(pairs[1], left[1]), right[1])
 

@@ -263,8 +263,14 @@ def _off_corners(functions: TorqueFunctions, witnesses: FloatArray) -> FloatArra
     cones, edges, moved = functions.cones, functions.edges, witnesses.copy()
     for i, j in permutations(range(functions.m), 2):
         corner = (cones.ends[edges[:, i]] == cones.starts[edges[:, j]]).all(axis=1)
-        meet = corner & ((1 - moved[:, i]) + moved[:, j] < _APART / 2)
-        rise = functions.slopes[:, :, j].max(axis=1, initial=0.0)
-        free = np.divide(functions.margins(moved), 2 * rise, out=np.ones(len(rise)), where=rise > 0)
-        moved[meet, j] += np.clip(free, 0.0, _APART / 2)[meet]
-    return np.where(functions.contain(moved)[:, None], moved, witnesses)
+        meet = np.flatnonzero(corner & ((1 - moved[:, i]) + moved[:, j] < _APART / 2))
+        if not meet.size:
+            continue
+        here = functions.take(meet)
+        rise = here.slopes[:, :, j].max(axis=1, initial=0.0)
+        margins = here.margins(moved[meet])
+        free = np.divide(margins, 2 * rise, out=np.ones(len(rise)), where=rise > 0)
+        step = moved[meet]
+        step[:, j] += np.clip(free, 0.0, _APART / 2)
+        moved[meet] = np.where(here.contain(step)[:, None], step, moved[meet])
+    return moved
