@@ -87,7 +87,8 @@ def peer_graph(
 
     `theta` is the half-angle of all friction cones, below 45°; `polytopes` finds the extreme points
     of the sub-polytopes; `meets` tells whether two regions, the first of them prepared, do. By
-    default it is the fastest predicate, which takes regions that only touch for adjacent ones.
+    default it is the fastest predicate, which takes regions that only touch for adjacent ones;
+    `interiors_meet` is the chapter's condition.
     """
     outline = Outline.of(polygon, theta)
     two_finger, pair_cells = two_finger_sets(outline)

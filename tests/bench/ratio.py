@@ -31,7 +31,7 @@ class Meeting:
     peer_counts: tuple[int, int]
     ours: list[float]
     peer: list[float]
-    exact_peer: list[float]  # interiors of cells have to meet
+    touching_peer: list[float]  # cells that only touch meet too
     qhull_peer: list[float]  # sub-polytopes by scipy's half-space intersection
 
     @property
@@ -48,7 +48,7 @@ class Meeting:
 def meet(polygon: rl.Polygon, repeats: int) -> list[Meeting]:
     """Time our graphs of a polygon and the peer's."""
     kinds = ["chapter"] + ["complete"] * (polygon.n_edges <= COMPLETE_UP_TO)
-    peer = peer_graph(polygon, THETA)
+    peer = peer_graph(polygon, THETA, meets=interiors_meet)
     found = []
     for sets in kinds:
         build = partial(rl.build_switching_graph, polygon, MU, sets=sets, switching="contact")
@@ -57,9 +57,9 @@ def meet(polygon: rl.Polygon, repeats: int) -> list[Meeting]:
             require_same_sets(graph, peer)
         calls = (
             build,
-            partial(peer_graph, polygon, THETA),
             partial(peer_graph, polygon, THETA, meets=interiors_meet),
-            partial(peer_graph, polygon, THETA, extreme_points_by_qhull),
+            partial(peer_graph, polygon, THETA),
+            partial(peer_graph, polygon, THETA, extreme_points_by_qhull, interiors_meet),
         )
         times = alternating(calls, repeats)
         counts = len(graph), graph.n_switches
@@ -95,11 +95,12 @@ def table(meetings: list[Meeting]) -> Table:
             "{} + {}".format(*m.peer_counts),
             ms(median(m.ours)),
             ms(median(m.peer)),
-            ms(median(m.exact_peer)),
-            ms(median(m.qhull_peer)),
             f"{median(m.ratios):.2f}",
             f"{min(m.ratios):.2f} to {max(m.ratios):.2f}",
             met(median(m.ratios), m.target),
+            ms(median(m.touching_peer)),
+            f"{median(m.ours) / median(m.touching_peer):.2f}",
+            ms(median(m.qhull_peer)),
         ]
         for m in meetings
     ]
@@ -110,20 +111,20 @@ def table(meetings: list[Meeting]) -> Table:
         "the peer's",
         "ours, ms",
         "peer, ms",
-        "interiors, ms",
-        "qhull, ms",
         "ratio",
         "all rounds",
         "target",
+        "touching, ms",
+        "ratio",
+        "qhull, ms",
     ]
     notes = [
         "Ours: contact rule, every vertex with margin and witness, every edge with a witness, "
         "all decided exactly.",
-        "The peer: the chapter's sets and focus rule in floating-point geometry, without margins "
-        "and witnesses, by the fastest predicate, for which cells that only touch meet. All of it "
-        "is in its favour.",
-        "Interiors: the peer with a predicate that asks for more than boundary points, as the "
-        "graph is meant. Qhull: the peer with sub-polytopes by scipy's half-space intersection, "
-        "points inside given.",
+        "The peer: the chapter's sets and focus rule, by cells whose interiors meet, in "
+        "floating-point geometry, without margins and witnesses.",
+        "Touching: the peer by the fastest predicate of GEOS, for which cells that only touch "
+        "meet: its graph has switches too many. Qhull: the peer with sub-polytopes by scipy's "
+        "half-space intersection, to the letter of the chapter.",
     ]
     return Table("Against the chapter's method on GEOS (θ = 10°)", headings, rows, notes)
