@@ -44,13 +44,13 @@ def piece_margins(functions: TorqueFunctions) -> FloatArray:
     alpha, a = functions.offsets[:, None, :], functions.slopes[:, None, :, :]
     beta, b = functions.offsets[:, :, None], functions.slopes[:, :, None, :]
 
-    def value(y: FloatArray | float) -> FloatArray:
+    def value(y: FloatArray) -> FloatArray:
         total = y * alpha - (1 - y) * beta
         for i in range(functions.m):
             total = total + np.maximum(0.0, y * a[..., i] - (1 - y) * b[..., i])
         return np.asarray(total)
 
-    best = np.minimum(value(0.0), value(1.0))
+    best = np.minimum(-beta, alpha + a.sum(axis=-1))  # y = 0 and y = 1: slopes are not negative
     for i in range(functions.m):
         both = a[..., i] + b[..., i]
         y = np.divide(b[..., i], both, out=np.zeros(both.shape), where=both > 0)

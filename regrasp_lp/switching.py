@@ -16,6 +16,7 @@ is decided in rational numbers.
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterable
 from dataclasses import dataclass
 from fractions import Fraction
@@ -339,8 +340,9 @@ def _slice(shadow: ExactShadow, x: Fraction) -> ExactShadow:
 
 def exact_bad_intervals(*both: ExactShadow) -> list[Interval | None]:
     """Return the bad intervals of x in rational numbers, one for each of `REASONS`."""
+    whole = [tuple(_in_integers(functions) for functions in shadow) for shadow in both]
     intervals = []
-    for (below, _), (_, above) in (both, both[::-1]):
+    for (below, _), (_, above) in (whole, whole[::-1]):
         conditions = [(c, a) for c, a, b in below if b == 0]
         conditions += [(-c, -a) for c, a, b in above if b == 0]
         conditions += [
@@ -351,22 +353,29 @@ def exact_bad_intervals(*both: ExactShadow) -> list[Interval | None]:
             if b_k > 0
         ]
         intervals.append(_exact_half_lines(conditions))
-    for below, above in both:
+    for below, above in whole:
         intervals.append(_exact_half_lines((c, a) for c, a, _ in below))
         intervals.append(_exact_half_lines((-(c + b), -a) for c, a, b in above))
     return intervals
 
 
-def _exact_half_lines(
-    conditions: Iterable[tuple[Fraction, Fraction]],
-) -> Interval | None:
+def _in_integers(functions: list[list[Fraction]]) -> list[list[int]]:
+    """Functions times positive numbers that make them integral: signs and roots stay."""
+    units = [math.lcm(*(v.denominator for v in function)) for function in functions]
+    return [
+        [v.numerator * (unit // v.denominator) for v in function]
+        for function, unit in zip(functions, units, strict=True)
+    ]
+
+
+def _exact_half_lines(conditions: Iterable[tuple[int, int]]) -> Interval | None:
     """The part of [0, 1] where ``constant + slope x >= 0`` throughout; None if empty."""
     lower, upper = Fraction(0), Fraction(1)
     for constant, slope in conditions:
         if slope > 0:
-            lower = max(lower, -constant / slope)
+            lower = max(lower, Fraction(-constant, slope))
         elif slope < 0:
-            upper = min(upper, -constant / slope)
+            upper = min(upper, Fraction(-constant, slope))
         elif constant < 0:
             return None
         if lower > upper:
