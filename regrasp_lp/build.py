@@ -30,7 +30,7 @@ from regrasp_lp.switches import (
 from regrasp_lp.switching import Meeting
 from regrasp_lp.switching_graph import GraphOptions, SwitchingGraph
 
-_SMALL = 16
+_SMALL = 20
 """Up to so many edges the whole graph is found as fast as a path without it."""
 
 

@@ -150,9 +150,9 @@ def certain_reasons(first: Shadows, second: Shadows, x: FloatArray | float = 0.0
     x : numpy.ndarray, shape (P,), or float
     """
     (u0, d0), (u1, d1) = (s.limits(x, inner=False) for s in (first, second))
-    real = (d0 < np.inf) & (u1 > -np.inf), (d1 < np.inf) & (u0 > -np.inf)
-    reasons = ((d0 <= u1) & real[0], (d1 <= u0) & real[1], d0 <= 0, u0 >= 1, d1 <= 0, u1 >= 1)
-    return np.stack(reasons, axis=1)
+    # Some t from -1 to 2 has δ <= t <= υ: so far from the edge the bounds of errors still hold.
+    orders = [np.maximum(d, -1.0) <= np.minimum(u, 2.0) for d, u in ((d0, u1), (d1, u0))]
+    return np.stack((*orders, d0 <= 0, u0 >= 1, d1 <= 0, u1 >= 1), axis=1)
 
 
 def _two_held(first: Shadows, second: Shadows) -> Meeting:
