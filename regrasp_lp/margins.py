@@ -100,7 +100,8 @@ def best_points(functions: TorqueFunctions, pieces: IntArray) -> FloatArray:
     -------
     numpy.ndarray, shape (N, m)
         Fractions. Contacts that make no difference are in the middle of their edges, those that
-        make the same difference at the same fraction.
+        make the same difference at the same fraction, those that only have to be beyond some
+        place half-way between that and the end.
     """
     every = np.arange(len(functions))
     j, k = pieces.T
@@ -117,16 +118,22 @@ def best_points(functions: TorqueFunctions, pieces: IntArray) -> FloatArray:
     lift = lift[every, best]
     tied = moves & (np.abs(lift) <= _TIED * both)
     fractions = np.where(moves, (lift > 0).astype(float), 0.5)
-    # At the ends of y one row is slack: a contact that only the other moves is best at its side.
-    at_end = best < 2
-    side = np.where(best == 0, 1.0, 0.0)[:, None]
-    fractions = np.where(at_end[:, None] & tied, side, fractions)
-    tied &= ~at_end[:, None]
     rest = np.where(tied, 0.0, fractions)
-    excess = alpha + beta + (both * rest).sum(axis=1)
+    above, below = alpha + (a * rest).sum(axis=1), beta + (b * rest).sum(axis=1)
     slope = np.where(tied, both, 0.0).sum(axis=1)
-    shared = np.divide(-excess, slope, out=np.zeros(len(every)), where=slope > 0)
-    return np.where(tied, np.clip(shared, 0.0, 1.0)[:, None], fractions)
+
+    def shared(excess: FloatArray) -> FloatArray:
+        ratio = np.divide(excess, slope, out=np.zeros(len(every)), where=slope > 0)
+        return np.asarray(np.clip(ratio, 0.0, 1.0))
+
+    margin = value[every, best]
+    # Both rows tight; or only that of j, then k leaves a part of the edges; or only that of k.
+    place = np.select(
+        (best == 0, best == 1),
+        ((shared(margin - above) + 1) / 2, shared(-margin - below) / 2),
+        shared(-above - below),
+    )
+    return np.where(tied, place[:, None], fractions)
 
 
 def existing_pieces(functions: TorqueFunctions) -> NDArray[np.intp]:

@@ -25,7 +25,7 @@ from regrasp_lp.friction import Cones
 from regrasp_lp.grasp_sets.vertices import candidate_functions
 from regrasp_lp.lp import get_solver
 from regrasp_lp.lp.exact_solver import exact_optimum
-from regrasp_lp.margins import best_pieces
+from regrasp_lp.margins import best_pieces, best_points
 from regrasp_lp.shadows import shadows
 from regrasp_lp.torque import TorqueFunctions
 
@@ -35,6 +35,11 @@ SOLVER = get_solver("clarabel")
 def existing(cones: Cones, kind: str) -> TorqueFunctions:
     functions, _ = candidate_functions(cones, kind)
     return functions.take(functions.exists())
+
+
+def sliver(overlap: float, mu: float) -> rl.Polygon:
+    """Two parallel edges at distance 1 that see each other within the cones by `overlap` only."""
+    return rl.Polygon([(0, 0), (1, 0), (2 + mu, 1), (1 + mu - overlap, 1)], name="sliver")
 
 
 def largest(rows: list[list[Fraction]], bounds: list[Fraction]) -> Fraction:
@@ -84,6 +89,31 @@ def test_margins_in_rationals_equal_the_closed_form(kind: str, friction: float) 
         assert max(programs) == largest_margin(functions, row)
 
 
+@pytest.mark.parametrize("kind", ["two_finger", "three_finger", "concurrent", "parallel"])
+@pytest.mark.parametrize(
+    ("polygon", "friction"),
+    [(comb(3), 0.5), (lattice_star(10, 2), 1.0), (star(9, 4), 1.5), (sliver(2.0**-30, 0.7), 0.7)],
+)
+def test_best_points_attain_the_margins(kind: str, polygon: rl.Polygon, friction: float) -> None:
+    """What attains the optimum of the dual is optimal; what leaves room is not at the end of it."""
+    functions = existing(Cones.of(polygon, friction), kind)
+    closed, pieces = best_pieces(functions)
+    points = best_points(functions, pieces)
+    assert ((points >= 0) & (points <= 1)).all()
+    every = np.arange(len(functions))
+    values = functions.values(points)
+    attained = np.minimum(values[every, pieces[:, 1]], -values[every, pieces[:, 0]])
+    np.testing.assert_allclose(attained, closed, atol=1e-14 * functions.cones.size, rtol=0)
+    for i in range(functions.m):
+        for end in (0.0, 1.0):
+            # to the opposite end: if nothing is lost there, the contact need not have been here
+            moved = points.copy()
+            moved[:, i] = 1 - end
+            there = functions.values(moved)
+            free = np.minimum(there[every, pieces[:, 1]], -there[every, pieces[:, 0]]) >= closed
+            assert not (free & (points[:, i] == end)).any()
+
+
 def test_scaled_functions_are_those_of_the_stack() -> None:
     for kind in ("three_finger", "parallel"):
         functions = existing(Cones.of(star(8, 2), 1.25), kind)
@@ -97,11 +127,6 @@ def test_scaled_functions_are_those_of_the_stack() -> None:
             np.testing.assert_allclose(
                 at_one, functions.values(np.ones(functions.m))[row, columns], atol=1e-12
             )
-
-
-def sliver(overlap: float, mu: float) -> rl.Polygon:
-    """Two parallel edges at distance 1 that see each other within the cones by `overlap` only."""
-    return rl.Polygon([(0, 0), (1, 0), (2 + mu, 1), (1 + mu - overlap, 1)], name="sliver")
 
 
 @pytest.mark.parametrize("exponent", [-3, -20, -30, -40, -48])
