@@ -16,10 +16,11 @@ from pathlib import Path
 
 import numpy as np
 
-from regrasp_lp.certification import certify, contact_rule_of, existence
+from regrasp_lp.certification import certify, contact_rule_of
 from regrasp_lp.completion import complete, complete_exactly
 from regrasp_lp.contact_rule import joined_optima
 from regrasp_lp.errors import SolverError
+from regrasp_lp.existence import existence
 from regrasp_lp.files import write_atomically
 from regrasp_lp.friction import FloatArray, IntArray
 from regrasp_lp.shadows import Shadows

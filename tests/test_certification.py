@@ -64,6 +64,24 @@ def test_every_graph_is_certified_and_its_file_accepted(
     assert checked.switches == len(listed)
 
 
+def turned(polygon: rl.Polygon, angle: float) -> rl.Polygon:
+    turn = np.array([[np.cos(angle), np.sin(angle)], [-np.sin(angle), np.cos(angle)]])
+    return rl.Polygon(polygon.vertices @ turn)
+
+
+@pytest.mark.parametrize("angle", [0.05, 0.31, 0.45, 0.84, 0.97, 1.5])
+@pytest.mark.parametrize("sets", ["complete", "chapter"])
+def test_sets_too_thin_for_doubles_are_proved(angle: float, sets: str, tmp_path: Path) -> None:
+    """Edges at 45° under μ = 1, but for rounding: some sets have no grasp in doubles."""
+    graph = rl.build_switching_graph(turned(rectangle(), angle), 1.0, sets=sets)
+    report = rl.certify(graph)
+    assert report.ok, str(report)
+    graph.save_certificates(tmp_path / "proof")
+    assert '"/' not in (text := (tmp_path / "proof").read_text())
+    assert check(tmp_path / "proof").switches > 0
+    assert ("/" in text) == (report.witnesses.yes < report.witnesses.decided)
+
+
 def test_critical_shapes_need_exact_arithmetic() -> None:
     """Else these tests would pass without it."""
     report = rl.certify(graph_of("lattice star"))

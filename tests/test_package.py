@@ -24,18 +24,19 @@ friction  wrenches  force_closure  random_grasps
 circuits  torque  margins
 linear_sets
 lp.solver  lp.ladder  lp.margin_lp  lp.highs_solver  lp.clarabel_solver  lp.exact_solver  lp
-exact_margins  polytopes
+exact_margins  completion  polytopes
 grasp_sets  grasp_sets.candidates  grasp_sets.families  grasp_sets.pieces  grasp_sets.vertices
 grasp_sets.sweeps  grasp_sets.focus  grasp_sets.double_cones  grasp_sets.parallel
 grasp_sets.collection
 quality
 planning  planning.hand  planning.steps
-shadows  switching  completion  joins  contact_rule  handovers  focus_rule  switches
+shadows  switching  joins  contact_rule  handovers  focus_rule  switches
 planning.plan_document  planning.verification  planning.plan  planning.plan_file  planning.account
 planning.search  planning.aligning  planning.path_lp  planning.regrip  planning.hops
 planning.execution
 planning.planner  planning.on_demand
-summary  tables  structure  switching_graph  certification  certificates  build  graph_file
+summary  tables  structure  switching_graph  existence  certification  certificates
+build  graph_file
 workers  many
 membership  sampling  completeness
 plotting.palette  plotting.placement  plotting.frame  plotting.outline  plotting.grasps

@@ -9,6 +9,7 @@ from itertools import permutations
 
 import numpy as np
 
+from regrasp_lp.completion import complete_exactly
 from regrasp_lp.errors import OptionError
 from regrasp_lp.exact_margins import certain_margins, exceeds
 from regrasp_lp.friction import BoolArray, Cones, FloatArray, IntArray
@@ -236,7 +237,7 @@ def _spread(functions: TorqueFunctions, witnesses: FloatArray) -> FloatArray:
 
 
 def _inside(functions: TorqueFunctions, witnesses: FloatArray) -> FloatArray:
-    """Replace witnesses that are not strictly inside, exactly, by one on the diagonal.
+    """Replace witnesses that are not strictly inside, exactly, by one on the diagonal or another.
 
     These are of sets thinner than the solver's accuracy. A set thinner than the doubles may keep
     a witness that is not inside: it exists, but no grasp in it can be written down.
@@ -244,6 +245,10 @@ def _inside(functions: TorqueFunctions, witnesses: FloatArray) -> FloatArray:
     witnesses = np.where(witnesses < 1e-12, 0.0, np.where(witnesses > 1 - 1e-12, 1.0, witnesses))
     for row in np.flatnonzero(~functions.contain(witnesses)).tolist():
         witnesses[row] = _diagonal_middle(functions, row)
+    for row in np.flatnonzero(~functions.contain(witnesses)).tolist():
+        exact = complete_exactly(functions, row, {})
+        if exact is not None:
+            witnesses[row] = [float(f) for f in exact]
     return _spread(functions, witnesses)
 
 
