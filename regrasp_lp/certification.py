@@ -15,14 +15,17 @@ import numpy as np
 from regrasp_lp.completion import complete, complete_exactly
 from regrasp_lp.contact_rule import meet_held
 from regrasp_lp.errors import OptionError
+from regrasp_lp.exact_margins import certain_margins
 from regrasp_lp.existence import existence
 from regrasp_lp.friction import IntArray
-from regrasp_lp.lp import get_solver
+from regrasp_lp.grasp_sets.vertices import Family
+from regrasp_lp.lp import GAP, get_solver
+from regrasp_lp.margins import best_pieces
 from regrasp_lp.shadows import Shadows
 from regrasp_lp.switches import SwitchPairs, SwitchRule
 from regrasp_lp.switching import Meeting
 from regrasp_lp.switching_graph import SwitchingGraph
-from regrasp_lp.torque import TorqueFunctions
+from regrasp_lp.torque import ACCURATE, TorqueFunctions
 
 _CHUNK = 200_000
 _SHOWN = 20
@@ -85,16 +88,19 @@ class Certification:
         lines = [f"{self.name or 'the graph'}: {'certified' if self.ok else 'FAULTS'}"]
         rows = [(f"{kind} sets", tally) for kind, tally in self.sets.items()]
         rows += [(f"switches, {held} held", tally) for held, tally in self.switches.items()]
-        for what, tally in [*rows, ("witnesses", self.witnesses)]:
-            lines.append(
-                f"  {what:<18}{tally.decided:>9} decided, {tally.yes:>9} yes, "
-                f"{tally.exactly:>6} exactly"
-            )
+        for what, tally in rows:
+            if tally.decided:
+                lines.append(
+                    f"  {what:<18}{tally.decided:>9} decided, {tally.yes:>9} yes, "
+                    f"{tally.exactly:>6} needed integers"
+                )
+        seen = self.witnesses
+        lines.append(f"  {'witnesses':<18}{seen.decided:>9} tested,  {seen.yes:>9} inside")
         return "\n".join([*lines, *(f"  fault: {fault}" for fault in self.faults)])
 
 
 def certify(graph: SwitchingGraph) -> Certification:
-    """Make every decision behind a graph once more, exactly, and compare.
+    """Make every decision behind a graph once more, exactly, and compare; margins of sets, too.
 
     Parameters
     ----------
@@ -108,7 +114,7 @@ def certify(graph: SwitchingGraph) -> Certification:
     Raises
     ------
     OptionError
-        If the graph was built with another rule or a margin.
+        If the graph was built with another rule or a margin, or is none.
 
     Examples
     --------
@@ -118,6 +124,8 @@ def certify(graph: SwitchingGraph) -> Certification:
     >>> report.ok, report.sets["three_finger"].yes
     (True, 8)
     """
+    if not isinstance(graph, SwitchingGraph):
+        raise OptionError(f"certify takes a SwitchingGraph, not a {type(graph).__name__}")
     check_provable(graph.options.switching, graph.options.min_margin)
     return _Comparison(graph).report()
 
@@ -191,8 +199,21 @@ class _Comparison:
                 where = f"the {kind} set on edges {_named(listed[row])}"
                 self.faults.append(f"the witness of {where} is outside")
         self.witnesses += Tally(len(inside), int(inside.sum()))
+        self._margins(family, listed)
         decided = len(found.exist)
         return Tally(decided, int(found.exist.sum()), int(found.exactly.sum()))
+
+    def _margins(self, family: Family, listed: list[tuple[int, ...]]) -> None:
+        functions = family.functions
+        margins = certain_margins(functions, *best_pieces(functions))
+        # those of a graph decided by programs are as good as the solver
+        slack = 0.0 if self.graph.options.presolve else GAP * functions.cones.size
+        wrong = np.abs(family.margins - margins) > ACCURATE * np.abs(margins) + slack
+        for row in np.flatnonzero(wrong).tolist():
+            self.faults.append(
+                f"the margin of the {family.kind} set on edges {_named(listed[row])} is "
+                f"{margins[row]:.9g}, not {family.margins[row]:.9g}"
+            )
 
     def _switches(self) -> dict[int, Tally]:
         tallies: dict[int, Tally] = {}

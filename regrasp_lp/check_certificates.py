@@ -110,8 +110,8 @@ class Report:
             f"accepted: {_shown(self.name)}, {self.edges} edges, friction {friction}, "
             f"{self.fingers} fingers, {self.sets} sets\n"
             f"  sets of candidates: {kinds}\n"
-            f"  pairs decided: {self.yes} yes, {self.no} no; {self.switches} switches; "
-            f"{self.seconds:.2f} s"
+            f"  pairs decided: {self.yes} yes, {self.no} no; {self.switches} switches that hold "
+            f"something (what need not is not proved); {self.seconds:.2f} s"
         )
 
 

@@ -201,7 +201,7 @@ def test_exponent_of_a_power() -> None:
 
 
 def test_ratios_are_round_by_round() -> None:
-    meeting = Meeting("a", 4, "chapter", (1, 2), (1, 2), [1.0, 4.0], [2.0, 2.0], [], [])
+    meeting = Meeting("a", 4, "chapter", (1, 2), (1, 2), [1.0, 4.0], [2.0, 2.0], [], [], [])
     assert meeting.ratios == [0.5, 2.0]
     assert meeting.target < dataclasses.replace(meeting, sets="complete").target
 

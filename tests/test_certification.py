@@ -178,6 +178,22 @@ def test_a_wrong_number_of_held_contacts_and_a_witness_outside_are_found() -> No
     assert faults == (f"the witness of the three_finger set on edges {edges} is outside",)
 
 
+def test_a_wrong_margin_is_found() -> None:
+    graph = graph_of("star")
+    pairs, triples = graph.sets.families
+    margins = triples.margins.copy()
+    margins[4] *= 1 + 1e-8
+    sets = GraspSets(graph.polygon, (pairs, replace(triples, margins=margins)))
+    faults = rl.certify(replace(graph, sets=sets)).faults
+    assert len(faults) == 1
+    assert f"edges {triples.functions.edges[4].tolist()} is {triples.margins[4]:.9g}" in faults[0]
+
+
+def test_what_is_no_graph_is_refused() -> None:
+    with pytest.raises(rl.OptionError, match="takes a SwitchingGraph, not a Polygon"):
+        rl.certify(unit_square())
+
+
 def test_other_rules_and_margins_have_no_certificates(tmp_path: Path) -> None:
     polygon, friction = CASES["star"]
     focus = rl.build_switching_graph(polygon, friction, sets="chapter", switching="focus")

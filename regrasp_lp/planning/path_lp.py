@@ -29,7 +29,7 @@ _LOG = logging.getLogger("regrasp_lp")
 _KEEP = 1e-6
 """Part of the tolerance that may be given up for travel, against rounding."""
 
-_SAME = 1e-9
+_SAME = 1e-6
 """Fractions closer than this along a stage are one."""
 
 

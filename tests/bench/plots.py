@@ -87,7 +87,7 @@ def draw_ratio(meetings: list[Meeting], path: Path) -> None:
     ticks = [0.1, 0.2, 0.5, 1, 2, 5, 10]
     axes.set_xticks(ticks, [f"{t:g}" for t in ticks])
     axes.minorticks_off()
-    axes.set_xlabel("our time by the peer's; rounds, median, and the target as a line")
+    axes.set_xlabel("our time divided by the peer's; rounds, median, and the target as a line")
     axes.grid(axis="x", color=palette.MATERIAL)
     axes.spines[["top", "right"]].set_visible(False)
     figure.savefig(path, dpi=_DPI)
