@@ -21,7 +21,7 @@ from regrasp_lp.friction import IntArray
 from regrasp_lp.grasp_sets.vertices import Family
 from regrasp_lp.lp import GAP, get_solver
 from regrasp_lp.margins import best_pieces
-from regrasp_lp.shadows import Shadows
+from regrasp_lp.shadows import Shadows, places_of
 from regrasp_lp.switches import SwitchPairs, SwitchRule
 from regrasp_lp.switching import Meeting
 from regrasp_lp.switching_graph import SwitchingGraph
@@ -290,34 +290,6 @@ def _has_a_double(functions: TorqueFunctions, row: int) -> bool:
         return True
     rounded = np.array([[float(f) for f in exact]])
     return bool(functions.take(np.array([row])).contain(rounded)[0])
-
-
-def places_of(held: IntArray, edges: IntArray) -> IntArray:
-    """Return which contacts of sets are held, on every edge the first ones; -1 for none.
-
-    Parameters
-    ----------
-    held : numpy.ndarray of int, shape (N, h)
-        Edges of held contacts, ascending; -1 for none.
-    edges : numpy.ndarray of int, shape (N, m)
-        Edges of the contacts of the sets.
-
-    Returns
-    -------
-    numpy.ndarray of int, shape (N, h)
-
-    Examples
-    --------
-    >>> places_of(np.array([[3, 3, -1], [3, 5, -1]]), np.array([[3, 3, 5], [3, 3, 5]])).tolist()
-    [[0, 1, -1], [0, 2, -1]]
-    """
-    places = np.full(held.shape, -1)
-    for column in range(held.shape[1]):
-        edge = held[:, column]
-        again = (held[:, :column] == edge[:, None]).sum(axis=1)
-        first = (edges == edge[:, None]).argmax(axis=1)
-        places[:, column] = np.where(edge >= 0, first + again, -1)
-    return places
 
 
 def _keys(n: int, i: IntArray, j: IntArray, held: IntArray | int) -> IntArray:

@@ -193,22 +193,32 @@ def shadows(
     return Shadows(tuple(sources), *arrays)
 
 
-def first_places(held: Sequence[int], edges: Sequence[int]) -> list[int]:
-    """Return which contacts of a set are held: on every edge the first ones.
+def places_of(held: IntArray, edges: IntArray) -> IntArray:
+    """Return which contacts of sets are held, on every edge the first ones; -1 for none.
 
     Parameters
     ----------
-    held : sequence of int
-        Edges of the held contacts, ascending.
-    edges : sequence of int
-        Edges of the contacts of the set, ascending.
+    held : numpy.ndarray of int, shape (N, h)
+        Edges of held contacts, ascending; -1 for none.
+    edges : numpy.ndarray of int, shape (N, m)
+        Edges of the contacts of the sets.
+
+    Returns
+    -------
+    numpy.ndarray of int, shape (N, h)
 
     Examples
     --------
-    >>> first_places((3, 5), (3, 3, 5))
-    [0, 2]
+    >>> places_of(np.array([[3, 3, -1], [3, 5, -1]]), np.array([[3, 3, 5], [3, 3, 5]])).tolist()
+    [[0, 1, -1], [0, 2, -1]]
     """
-    return [edges.index(e) + held[:i].count(e) for i, e in enumerate(held)]
+    places = np.full(held.shape, -1)
+    for column in range(held.shape[1]):
+        edge = held[:, column]
+        again = (held[:, :column] == edge[:, None]).sum(axis=1)
+        first = (edges == edge[:, None]).argmax(axis=1)
+        places[:, column] = np.where(edge >= 0, first + again, -1)
+    return places
 
 
 def _project(

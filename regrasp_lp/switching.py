@@ -104,11 +104,6 @@ def meet(
     return result
 
 
-def can_switch(first: Shadows, second: Shadows) -> BoolArray:
-    """Whether aligned projections on the same held contacts have a common point, exactly."""
-    return meet(first, second).exist
-
-
 def _seen(
     first: Shadows, second: Shadows, i: IntArray, j: IntArray, rows: IntArray, result: Meeting
 ) -> IntArray:

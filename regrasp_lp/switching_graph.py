@@ -27,7 +27,7 @@ from regrasp_lp.planning.planner import (
     checked_grasp,
 )
 from regrasp_lp.polygon import Polygon
-from regrasp_lp.shadows import first_places
+from regrasp_lp.shadows import places_of
 from regrasp_lp.structure import Structure, structure
 from regrasp_lp.summary import KindCounts, Summary
 from regrasp_lp.switches import (
@@ -220,13 +220,13 @@ class SwitchingGraph:
         low, high = sorted((first, second))
         found = self.switches.witness(low, high)
         slots, points = found or (np.zeros(0, dtype=np.int8), np.zeros(0))
-        edges = self.sets[low].edges
+        edges = np.array(self.sets[low].edges)[slots]
         grasps = {}
         for index in (low, high):
             family, row = self.sets.place(index)
             functions = self.sets.families[family].functions.take(np.array([row]))
-            there = first_places([edges[s] for s in slots], self.sets[index].edges)
-            fractions = complete(functions, np.array([there]), points[None, :])
+            there = places_of(edges[None, :], functions.edges)
+            fractions = complete(functions, there, points[None, :])
             grasps[index] = self.sets.grasp(index, fractions[0])
         return grasps[first], grasps[second]
 

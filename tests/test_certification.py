@@ -16,10 +16,10 @@ from geometry import comb, lattice_star, rectangle, regular, staircase, star, un
 
 import regrasp_lp as rl
 from regrasp_lp.certificates import save_certificates
-from regrasp_lp.certification import places_of
 from regrasp_lp.check_certificates import Rejected, check
 from regrasp_lp.grasp_sets.collection import GraspSets
 from regrasp_lp.grasp_sets.vertices import Family
+from regrasp_lp.shadows import places_of
 from regrasp_lp.switches import StoredSwitches
 
 CASES = {

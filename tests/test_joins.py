@@ -18,7 +18,7 @@ from regrasp_lp.lp import get_solver, maximise_margins
 from regrasp_lp.margins import best_pieces, existing_pieces
 from regrasp_lp.polygon import Polygon
 from regrasp_lp.shadows import Shadows, shadows
-from regrasp_lp.switching import can_switch
+from regrasp_lp.switching import meet
 
 CLARABEL, HIGHS = get_solver("clarabel"), get_solver("highs")
 CASES = {
@@ -85,7 +85,7 @@ def test_joins_are_grasps_and_solvers_agree(case: str, sets: str, held: int) -> 
     results = [best_joins(first, second, solver) for solver in (CLARABEL, HIGHS)]
     for joins in results:
         assert_grasps(polygon, mu, first, second, joins)
-        np.testing.assert_array_equal(joins.exist, can_switch(first, second))
+        np.testing.assert_array_equal(joins.exist, meet(first, second).exist)
     np.testing.assert_allclose(results[0].margins, results[1].margins, atol=1e-8 * polygon.diameter)
 
 

@@ -39,9 +39,9 @@ from regrasp_lp.joins import best_joins
 from regrasp_lp.lp import get_solver
 from regrasp_lp.planning.hand import Hand
 from regrasp_lp.polygon import Polygon
-from regrasp_lp.shadows import Shadows, first_places, shadows
+from regrasp_lp.shadows import Shadows, places_of, shadows
 from regrasp_lp.switches import StoredSwitches, SwitchesOnDemand, SwitchPairs, SwitchRule
-from regrasp_lp.switching import Meeting, can_switch, meet
+from regrasp_lp.switching import Meeting, meet
 from regrasp_lp.torque import TorqueFunctions
 
 CASES = {
@@ -62,6 +62,10 @@ CASES = {
     "friction per edge": (star(8, 2), (0.125, 2.0, 0.25, 0.5, 1.0, 0.125, 0.5, 0.75)),
 }
 GRID = 9
+
+
+def can_meet(first: Shadows, second: Shadows) -> np.ndarray:
+    return meet(first, second).exist
 
 
 @dataclass(frozen=True)
@@ -98,13 +102,13 @@ def pairs_within(stack: Shadows, seed: int = 0, most: int = 4000) -> Pairs:
         stack.row[rows[:, 0]] == stack.row[rows[:, 1]]
     )
     rows = rows[~same_set]
-    answer = can_switch(stack.take(rows[:, 0]), stack.take(rows[:, 1]))
+    answer = can_meet(stack.take(rows[:, 0]), stack.take(rows[:, 1]))
     # Most answers are yes: keep all the others, and some of these.
     keep = np.flatnonzero(answer)
     keep = np.random.default_rng(seed).permutation(keep)[: max(0, most - (~answer).sum())]
     rows = rows[np.sort(np.concatenate((keep, np.flatnonzero(~answer)[:most])))]
     first, second = stack.take(rows[:, 0]), stack.take(rows[:, 1])
-    return Pairs(first, second, can_switch(first, second))
+    return Pairs(first, second, can_meet(first, second))
 
 
 @cache
@@ -225,7 +229,7 @@ def test_projections_of_chosen_sets_and_of_none() -> None:
     nothing = shadows(stacks, 2, rows=[np.zeros(0, dtype=np.intp)] * 2)
     assert len(nothing) == 0
     assert nothing.edges.shape == (0, 2)
-    assert can_switch(nothing, nothing).shape == (0,)
+    assert can_meet(nothing, nothing).shape == (0,)
 
 
 def test_sets_with_fewer_contacts_than_held_have_no_projection() -> None:
@@ -307,7 +311,7 @@ def projections_meet(first: Shadows, second: Shadows, index: int) -> bool:
 @pytest.mark.parametrize("held", [1, 2])
 def test_synthetic_projections_against_elimination(held: int) -> None:
     first, second = synthetic_pairs(1, 700, held)
-    answer = can_switch(first, second)
+    answer = can_meet(first, second)
     expected = [projections_meet(first, second, i) for i in range(len(first))]
     np.testing.assert_array_equal(answer, expected)
     assert 0.2 < np.mean(expected) < 0.9
@@ -318,7 +322,7 @@ def test_synthetic_projections_against_elimination(held: int) -> None:
 def test_many_synthetic_projections_against_elimination(held: int) -> None:
     first, second = synthetic_pairs(2, 20_000, held)
     expected = [projections_meet(first, second, i) for i in range(len(first))]
-    np.testing.assert_array_equal(can_switch(first, second), expected)
+    np.testing.assert_array_equal(can_meet(first, second), expected)
 
 
 @pytest.mark.parametrize("held", [1, 2])
@@ -329,7 +333,7 @@ def test_the_filter_agrees_with_rational_numbers_on_synthetic_projections(held: 
     expected = [point is not None for point in points]
     found = meet(first, second)
     np.testing.assert_array_equal(found.exist, expected)
-    np.testing.assert_array_equal(can_switch(second, first), expected)
+    np.testing.assert_array_equal(can_meet(second, first), expected)
     for i in np.flatnonzero(expected).tolist():
         assert all(0 <= x <= 1 and completes(first, second, i, points[i]) for x in points[i])
         inside = completes(first, second, i, [Fraction(x) for x in found.points[i]])
@@ -411,8 +415,8 @@ def interval(low: float, high: float) -> Synthetic:
     ],
 )
 def test_touching_intervals_do_not_meet(first: tuple, second: tuple, expected: bool) -> None:
-    assert can_switch(interval(*first), interval(*second))[0] == expected
-    assert can_switch(interval(*second), interval(*first))[0] == expected
+    assert can_meet(interval(*first), interval(*second))[0] == expected
+    assert can_meet(interval(*second), interval(*first))[0] == expected
 
 
 # --- the decision on grasp sets -----------------------------------------------------------------
@@ -457,7 +461,7 @@ def test_touching_projections_reach_the_rational_numbers(
         return answers[-1]
 
     monkeypatch.setattr(switching, name, counting)
-    np.testing.assert_array_equal(can_switch(found.first, found.second), found.answer)
+    np.testing.assert_array_equal(can_meet(found.first, found.second), found.answer)
     assert answers.count(None) > 3
 
 
@@ -533,19 +537,19 @@ def test_switches_against_elimination_in_full_coordinates(case: str, sets: str) 
 @pytest.mark.parametrize("held", [1, 2])
 def test_exchanging_the_two_sets_changes_nothing(case: str, held: int) -> None:
     found = pairs_of(case, "complete", held)
-    np.testing.assert_array_equal(can_switch(found.second, found.first), found.answer)
+    np.testing.assert_array_equal(can_meet(found.second, found.first), found.answer)
 
 
 @pytest.mark.parametrize("held", [1, 2])
 def test_a_set_can_switch_to_itself(held: int) -> None:
     stack = shadows(sources("star", "complete"), held)
-    assert can_switch(stack, stack).all()
+    assert can_meet(stack, stack).all()
 
 
 def test_many_pairs_in_chunks_are_decided_as_in_one(monkeypatch: pytest.MonkeyPatch) -> None:
     found = pairs_of("star", "complete", 1)
     monkeypatch.setattr(switching, "_CHUNK", 97)
-    np.testing.assert_array_equal(can_switch(found.first, found.second), found.answer)
+    np.testing.assert_array_equal(can_meet(found.first, found.second), found.answer)
 
 
 def test_with_friction_above_one_and_two_centres() -> None:
@@ -764,8 +768,8 @@ def test_every_stored_switch_has_a_witness_in_both_sets(name: str, fingers: int)
             source = np.searchsorted(rule.offsets, index, side="right") - 1
             functions = rule.sources[source].take(np.array([index - rule.offsets[source]]))
             if not sides:
-                edges = functions.edges[0, slots].tolist()
-            there = first_places(edges, functions.edges[0].tolist())
+                edges = functions.edges[:, slots]
+            there = places_of(edges, functions.edges)[0].tolist()
             fractions = complete(functions, np.array([there]), points[None])
             assert functions.contain(fractions)[0]
             np.testing.assert_array_equal(fractions[0, there], points)
