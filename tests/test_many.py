@@ -706,7 +706,9 @@ def test_an_interrupt_ends_all_at_once(everybody: bool, later: float) -> None:
     (os.killpg if everybody else os.kill)(process.pid, signal.SIGINT)
     out, err = process.communicate(timeout=30)
     assert time.monotonic() - sent < 5
-    assert (process.returncode, out, err) == (130, "", "regrasp-lp: interrupted\n")
+    assert (process.returncode, out) == (130, "")
+    # a thread of the pool may complain of the futures that were cancelled under it
+    assert err.endswith("regrasp-lp: interrupted\n")
     wait_until(lambda: not running(process.pid), 5)
 
 
