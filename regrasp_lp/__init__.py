@@ -32,18 +32,22 @@ from regrasp_lp.errors import (
     RegraspError,
     SolverError,
 )
+from regrasp_lp.explanation import Explanation
 from regrasp_lp.files import read_polygons
 from regrasp_lp.force_closure import is_force_closure, least_friction
 from regrasp_lp.graph_file import load_graph
 from regrasp_lp.grasp_sets.collection import GraspSet
 from regrasp_lp.many import Built, build_switching_graphs
 from regrasp_lp.planning.hand import Hand
+from regrasp_lp.planning.path_set import PathSet
 from regrasp_lp.planning.plan import Plan
 from regrasp_lp.planning.plan_file import check_plan, read_plan
+from regrasp_lp.planning.sensitivity import Sensitivity
 from regrasp_lp.planning.steps import Place, Release, Slide
 from regrasp_lp.polygon import Polygon
 from regrasp_lp.quality import margin, tolerance
 from regrasp_lp.switching_graph import SwitchingGraph
+from regrasp_lp.why_not import explain
 
 __version__ = "0.1.0"
 
@@ -53,6 +57,7 @@ __all__ = [
     "Contact",
     "ContactError",
     "Coverage",
+    "Explanation",
     "FileFormatError",
     "FrictionError",
     "Grasp",
@@ -63,12 +68,14 @@ __all__ = [
     "NoPlanFound",
     "NotForceClosureError",
     "OptionError",
+    "PathSet",
     "Place",
     "Plan",
     "Polygon",
     "PolygonError",
     "RegraspError",
     "Release",
+    "Sensitivity",
     "Slide",
     "SolverError",
     "SwitchingGraph",
@@ -77,6 +84,7 @@ __all__ = [
     "certify",
     "check_plan",
     "coverage",
+    "explain",
     "is_force_closure",
     "least_friction",
     "load_graph",

@@ -3,21 +3,28 @@
 from __future__ import annotations
 
 import time
+from collections.abc import Iterable
 
 import numpy as np
 from numpy.typing import ArrayLike
 
 from regrasp_lp.contact_rule import meet_by_lp, meet_held
-from regrasp_lp.errors import HandError, OptionError
+from regrasp_lp.couplings import coupled_rule
+from regrasp_lp.errors import HandError, NoPlanFound, OptionError
 from regrasp_lp.focus_rule import FocusRule
 from regrasp_lp.friction import Cones, IntArray
+from regrasp_lp.graph_options import GraphOptions
 from regrasp_lp.grasp_sets.collection import GraspSets
+from regrasp_lp.grasp_sets.spaced import spaced_family
 from regrasp_lp.grasp_sets.vertices import Progress, build_family, kinds_of
 from regrasp_lp.lp import Solver, get_solver
 from regrasp_lp.planning.hand import Hand
-from regrasp_lp.planning.on_demand import problem_on_demand
+from regrasp_lp.planning.nearby import plan_on_demand
+from regrasp_lp.planning.objective import Objective, ObjectiveLike
 from regrasp_lp.planning.plan import Plan
-from regrasp_lp.planning.planner import GraspLike, check_aligning, checked_grasp
+from regrasp_lp.planning.reach import hand_cones, spacing_of
+from regrasp_lp.planning.requests import GraspLike, check_aligning, checked_grasp
+from regrasp_lp.planning.steering import Weight, checked_numbers
 from regrasp_lp.polygon import Polygon
 from regrasp_lp.shadows import Shadows
 from regrasp_lp.switches import (
@@ -28,7 +35,7 @@ from regrasp_lp.switches import (
     SwitchRule,
 )
 from regrasp_lp.switching import Meeting
-from regrasp_lp.switching_graph import GraphOptions, SwitchingGraph
+from regrasp_lp.switching_graph import SwitchingGraph
 
 _SMALL = 20
 """Up to so many edges the whole graph is found as fast as a path without it."""
@@ -53,7 +60,7 @@ def build_switching_graph(
     friction : float or sequence of float
         μ, one value or one per edge.
     hand : Hand, optional
-        Four fingers by default.
+        Four fingers without limits by default.
     sets : {"complete", "chapter"}
         All force-closure grasps of 2 and 3 contacts, or the chapter's two-finger, concurrent and
         parallel sets.
@@ -94,14 +101,19 @@ def build_switching_graph(
     hand = check_options(hand, sets, switching, min_margin, solver)
     kinds, backend = kinds_of(sets), get_solver(solver)
     seconds, started = {}, time.perf_counter()
-    cones = Cones.of(polygon, friction)
+    cones = hand_cones(polygon, friction, hand)
     families = tuple(
         build_family(
             cones, kind, backend, presolve=presolve, min_margin=min_margin, progress=progress
         )
         for kind in kinds
     )
-    grasp_sets = GraspSets(polygon, families)
+    spacing = spacing_of(cones, hand)
+    if spacing is not None:
+        families = tuple(
+            spaced_family(family, spacing, backend, min_margin=min_margin) for family in families
+        )
+    grasp_sets = GraspSets(polygon, families, spacing)
     seconds["sets"] = time.perf_counter() - started
 
     started = time.perf_counter()
@@ -115,7 +127,7 @@ def build_switching_graph(
         switches = StoredSwitches.of_pairs(len(grasp_sets), rule.pairs(progress))
     seconds["switches"] = time.perf_counter() - started
     options = GraphOptions(sets, switching, float(min_margin), solver, presolve)
-    return SwitchingGraph(grasp_sets, switches, cones.friction, hand, options, seconds)
+    return SwitchingGraph(grasp_sets, switches, cones.whole.friction, hand, options, seconds)
 
 
 def check_options(
@@ -150,8 +162,9 @@ def check_switching(switching: str, sets: str, hand: Hand) -> None:
             'use sets="chapter", or switching="contact"'
         )
     if switching == "focus" and hand != Hand(4):
+        which = "a hand with limits" if hand.fingers == 4 else str(hand.fingers)
         raise HandError(
-            f'switching="focus" is defined for four fingers, not for {hand.fingers}: '
+            f'switching="focus" is defined for four fingers, not for {which}: '
             'use Hand(4), or switching="contact"'
         )
 
@@ -175,6 +188,8 @@ def switch_rule(
         aligned = (first if i is None else first.take(i), second if j is None else second.take(j))
         return meet_by_lp(*aligned, solver, min_margin, exact=False)
 
+    if sets.spacing is not None:
+        return SwitchRule(sets.sources, hand, coupled_rule(sets, solver, min_margin=min_margin))
     if switching == "contact":
         return SwitchRule(sets.sources, hand, contact)
     focus = FocusRule.of(sets)
@@ -202,12 +217,16 @@ def plan_regrasp(
     hand: Hand | None = None,
     sets: str = "complete",
     aligning: str = "slide",
+    objective: ObjectiveLike = "placements",
+    weight: Weight | None = None,
+    avoid_edges: Iterable[int] = (),
 ) -> Plan:
-    """Return a verified plan with the fewest placements from one grasp to another.
+    """Return the best verified plan from one grasp to another.
 
     With complete sets and four fingers only the neighbourhoods of start and goal are looked at, so
     that objects with hundreds of edges take little longer than small ones; otherwise, for objects
-    so small that it takes no longer, and to explain why there is no plan, the whole graph is built.
+    so small that it takes no longer, to explain why there is no plan, and with `weight` or
+    `avoid_edges`, the whole graph is built.
 
     Parameters
     ----------
@@ -215,7 +234,8 @@ def plan_regrasp(
     start, goal : Grasp or iterable of (edge, position)
     friction, hand, sets
         As for `build_switching_graph`.
-    aligning : {"slide", "regrip"}
+    aligning, objective, weight, avoid_edges
+        As for `SwitchingGraph.plan`; the numbers of sets are those of `build_switching_graph`.
 
     Returns
     -------
@@ -223,28 +243,27 @@ def plan_regrasp(
 
     Raises
     ------
-    NoPlanFound, NotForceClosureError, ContactError, HandError, SolverError
+    NoPlanFound, NotForceClosureError, ContactError, HandError, OptionError, SolverError
         As for `SwitchingGraph.plan`.
     """
     check_aligning(aligning)
+    aim = Objective.of(objective)
     hand = _checked_hand(hand)
     cones = Cones.of(polygon, friction)
     first, last = (
         checked_grasp(polygon, grasp, cones.friction, hand, role)
         for role, grasp in (("start", start), ("goal", goal))
     )
-    large = polygon.n_edges > _SMALL
+    avoid = checked_numbers("avoid_edges", avoid_edges, polygon.n_edges, "the polygon has edges")
+    large = polygon.n_edges > _SMALL and weight is None and not avoid
     if large and "three_finger" in kinds_of(sets) and hand == Hand(4):
-        problem = problem_on_demand(
-            polygon,
-            cones,
-            get_solver("clarabel"),
-            first,
-            last,
-            all_pairs=aligning == "regrip",
-        )
-        plan = problem.plan(first, last, aligning) if problem is not None else None
+        asked = {"polygon": polygon, "start": first, "goal": last, "friction": friction}
+        solver = get_solver("clarabel")
+        try:
+            plan = plan_on_demand(polygon, cones, solver, first, last, aligning, aim)
+        except NoPlanFound as answer:
+            raise answer.about(asked) from None
         if plan is not None:
             return plan
     graph = build_switching_graph(polygon, friction, hand, sets)
-    return graph.plan(start, goal, aligning)
+    return graph.plan(start, goal, aligning, objective, weight, avoid)

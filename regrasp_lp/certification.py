@@ -21,6 +21,7 @@ from regrasp_lp.friction import IntArray
 from regrasp_lp.grasp_sets.vertices import Family
 from regrasp_lp.lp import GAP, get_solver
 from regrasp_lp.margins import best_pieces
+from regrasp_lp.planning.hand import Hand
 from regrasp_lp.shadows import Shadows, places_of
 from regrasp_lp.switches import SwitchPairs, SwitchRule
 from regrasp_lp.switching import Meeting
@@ -114,7 +115,7 @@ def certify(graph: SwitchingGraph) -> Certification:
     Raises
     ------
     OptionError
-        If the graph was built with another rule or a margin, or is none.
+        If the graph was built with another rule, a margin or a hand with limits, or is none.
 
     Examples
     --------
@@ -126,11 +127,11 @@ def certify(graph: SwitchingGraph) -> Certification:
     """
     if not isinstance(graph, SwitchingGraph):
         raise OptionError(f"certify takes a SwitchingGraph, not a {type(graph).__name__}")
-    check_provable(graph.options.switching, graph.options.min_margin)
+    check_provable(graph.options.switching, graph.options.min_margin, graph.hand)
     return _Comparison(graph).report()
 
 
-def check_provable(switching: str, min_margin: float) -> None:
+def check_provable(switching: str, min_margin: float, hand: Hand) -> None:
     """Raise OptionError if there are no certificates for graphs with such options."""
     if switching != "contact":
         raise OptionError(
@@ -142,6 +143,8 @@ def check_provable(switching: str, min_margin: float) -> None:
             f"certificates are for min_margin=0, not for min_margin={min_margin:g}: build the "
             "graph without a margin"
         )
+    if hand.limited:
+        raise OptionError("certificates are not for a hand with limits: use Hand(fingers=k)")
 
 
 def contact_rule_of(graph: SwitchingGraph) -> SwitchRule:

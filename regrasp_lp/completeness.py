@@ -266,6 +266,8 @@ def coverage(
             raise OptionError("graph is of another object or friction than those given")
     elif whole or (whole is None and polygon.n_edges <= WHOLE_LIMIT):
         graph = build_switching_graph(polygon, friction, hand, sets)
+    if (hand if graph is None else graph.hand).limited:
+        raise OptionError("coverage is not measured for a hand with limits: use Hand(fingers=k)")
     known: KnownSets = CombinationSets(cones, sets) if graph is None else GraphSets(graph)
     draws = RandomGrasps(polygon, cones.friction, proposal)
     run = Measurement(known, draws, np.random.default_rng(seed), int(max_draws))

@@ -6,6 +6,12 @@ Those that stand for a bad argument are a `ValueError` as well, so that generic 
 
 from __future__ import annotations
 
+from collections.abc import Callable, Mapping
+from typing import TYPE_CHECKING, Any
+
+if TYPE_CHECKING:
+    from regrasp_lp.explanation import Explanation
+
 
 class RegraspError(Exception):
     """Base class of all errors raised by `regrasp_lp`."""
@@ -61,12 +67,44 @@ class NoPlanFound(RegraspError):
 
     This is an answer, not a failure.
 
-    Attributes
+    Parameters
     ----------
     explanation : str
-        Why: the components that start and goal are in, or which of them is in no set.
+        Why, in one line: the components that start and goal are in, or which of them is in no set.
+    question : mapping of str to object, optional
+        What was asked: the arguments of `regrasp_lp.explain`.
     """
 
-    def __init__(self, explanation: str) -> None:
+    def __init__(self, explanation: str, question: Mapping[str, Any] | None = None) -> None:
         super().__init__(explanation)
         self.explanation = explanation
+        self.question = question
+
+    def __reduce__(self) -> tuple[type[NoPlanFound], tuple[str, Mapping[str, Any] | None]]:
+        return NoPlanFound, (self.explanation, self.question)
+
+    def about(self, question: Mapping[str, Any]) -> NoPlanFound:
+        """Return the same answer to a question; the one it has already stays."""
+        return NoPlanFound(self.explanation, self.question or question)
+
+    def explain(self, progress: Callable[[str, int, int], None] | None = None) -> Explanation:
+        """Tell in full why there is no plan, and what would help; this may take some seconds.
+
+        Parameters
+        ----------
+        progress : callable, optional
+            Called as ``progress(what, done, total)`` now and then.
+
+        Raises
+        ------
+        OptionError
+            If this answer is not about two grasps of an object.
+        """
+        if self.question is None:
+            raise OptionError(
+                f"nothing more can be said about this answer ({self.explanation}): "
+                "use regrasp_lp.explain with a start and a goal"
+            )
+        from regrasp_lp.why_not import explain
+
+        return explain(**self.question, progress=progress)

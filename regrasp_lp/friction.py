@@ -5,8 +5,11 @@ Edge ``i`` runs along ``T = b - a``; with ``rot90(x, y) = (-y, x)`` its cone is 
     e = rot90(T) ± μ T        (+: the clockwise ray, −: the counter-clockwise one),
 
 unnormalised, so that every ray is rational in the coordinates and μ. All that the rest of the
-package asks about directions is the *sign* of a cross product of two rays: these are decided
-exactly, by a floating-point filter and integers for what the filter leaves open.
+package asks about directions is the *sign* of a cross product of two rays: `directions` decides it
+exactly.
+
+A hand may not be able to touch all of an edge. What can be touched are *segments* of edges, and all
+that is said of edges holds for these: they are shorter edges, with exactly the same directions.
 """
 
 from __future__ import annotations
@@ -19,6 +22,9 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from regrasp_lp.contact import FRACTION_SNAP
+from regrasp_lp.directions import UNIT_ROUNDOFF as UNIT_ROUNDOFF
+from regrasp_lp.directions import Directions
 from regrasp_lp.errors import FrictionError, PolygonError
 from regrasp_lp.polygon import Polygon
 
@@ -28,8 +34,6 @@ BoolArray = NDArray[np.bool_]
 ObjectArray = NDArray[np.object_]
 SignArray = NDArray[np.int8]
 
-UNIT_ROUNDOFF = 2.0**-53
-_NEARLY_PARALLEL = 1e-5
 _LEAST_FRICTION, _MOST_FRICTION = 1e-100, 1e6
 
 
@@ -85,143 +89,25 @@ def per_edge_friction(friction: ArrayLike, n_edges: int) -> FloatArray:
 
 
 @dataclass(frozen=True, eq=False)
-class Directions:
-    """k directions ``α rot90(T) + β T`` to each edge vector T, and how they turn to each other.
-
-    Direction ``k i + j`` is the j-th one of edge i.
-
-    Parameters
-    ----------
-    vectors : numpy.ndarray, shape (n, 2)
-        Vector T of each edge.
-    exact_vectors : numpy.ndarray of object (int), shape (n, 2)
-        The same as integers: ``vectors = exact_vectors / unit``, before any rounding.
-    unit : int
-    across : numpy.ndarray, shape (n, k)
-        α, which is 0 or 1.
-    along : numpy.ndarray, shape (n, k)
-        β.
-    """
-
-    vectors: FloatArray
-    exact_vectors: ObjectArray
-    unit: int
-    across: FloatArray
-    along: FloatArray
-
-    @cached_property
-    def values(self) -> FloatArray:
-        """The directions, shape (n k, 2)."""
-        x, y = self.vectors.T
-        normal = np.stack((-y, x), axis=1)
-        across, along = self.across[:, :, None], self.along[:, :, None]
-        of_edges = across * normal[:, None, :] + along * self.vectors[:, None, :]
-        return np.asarray(of_edges.reshape(-1, 2))
-
-    @cached_property
-    def lengths(self) -> FloatArray:
-        """Their lengths, shape (n k,)."""
-        return np.hypot(self.values[:, 0], self.values[:, 1])
-
-    @cached_property
-    def units(self) -> FloatArray:
-        """The directions scaled to length 1, shape (n k, 2)."""
-        return self.values / self.lengths[:, None]
-
-    @cached_property
-    def _integers(self) -> tuple[ObjectArray, ObjectArray]:
-        beta = [Fraction(float(b)) for b in self.along.ravel()]
-        p = np.array([b.numerator for b in beta], dtype=object).reshape(*self.along.shape, 1)
-        q = np.array([b.denominator for b in beta], dtype=object).reshape(*self.along.shape, 1)
-        alpha = self.across.astype(int).astype(object)[:, :, None]
-        x, y = self.exact_vectors.T
-        normal = np.stack((-y, x), axis=1)[:, None, :]
-        exact = q * alpha * normal + p * self.exact_vectors[:, None, :]
-        return exact.reshape(-1, 2), (self.unit * q).ravel()
-
-    @property
-    def exact(self) -> ObjectArray:
-        """Each direction times a positive number that makes it integral, shape (n k, 2)."""
-        return self._integers[0]
-
-    @cached_property
-    def _crosses(self) -> tuple[FloatArray, SignArray]:
-        """Cross products of all pairs, and their exact signs.
-
-        With ``c = T1 × T2`` and ``d = T1 · T2`` the cross product of two directions is
-        ``c (α1 α2 + β1 β2) + d (β1 α2 − α1 β2)``. Each of the two terms carries at most eight
-        roundings, each relative to the sum of the magnitudes of its products, so 16 unit
-        roundoffs of these magnitudes bound the error. Where every product has a factor 0, it is 0.
-        Values of nearly parallel directions are taken from integers, so that all have a
-        relative accuracy of 1e-9 or better; their signs are too, for a value may be smaller than
-        any double.
-        """
-        x, y = self.vectors.T
-        xy, yx = np.outer(x, y), np.outer(y, x)
-        xx, yy = np.outer(x, x), np.outer(y, y)
-        alpha, beta = self.across.ravel(), self.along.ravel()
-        k = self.along.shape[1]
-
-        def of_edges(each: FloatArray) -> FloatArray:
-            return each.repeat(k, axis=0).repeat(k, axis=1)
-
-        aa, bb = np.outer(alpha, alpha), np.outer(beta, beta)
-        difference = np.outer(beta, alpha) - np.outer(alpha, beta)
-        value = of_edges(xy - yx) * (aa + bb) + difference * of_edges(xx + yy)
-        bound = of_edges(np.abs(xy) + np.abs(yx)) * (aa + np.abs(bb))
-        bound += np.abs(difference) * of_edges(np.abs(xx) + np.abs(yy))
-        bound *= 16 * UNIT_ROUNDOFF
-        inaccurate = np.maximum(bound, _NEARLY_PARALLEL * np.outer(self.lengths, self.lengths))
-        sx, sy = np.abs(np.sign(x)), np.abs(np.sign(y))
-        crossing = of_edges(np.outer(sx, sy) + np.outer(sy, sx))
-        aligned = of_edges(np.outer(sx, sx) + np.outer(sy, sy))
-        open_ = (np.abs(value) <= inaccurate) & (
-            (crossing > 0) | ((difference != 0) & (aligned > 0))
-        )
-        first, second = np.nonzero(np.triu(open_, 1))
-        if first.size:
-            e1, e2 = self.exact[first], self.exact[second]
-            exact = e1[:, 0] * e2[:, 1] - e1[:, 1] * e2[:, 0]
-            factor = self._integers[1][first] * self._integers[1][second]
-            accurate = np.array([c / f for c, f in zip(exact, factor, strict=True)], dtype=float)
-            value[first, second] = accurate
-            value[second, first] = -accurate
-        np.fill_diagonal(value, 0.0)
-        sign = np.sign(value).astype(np.int8)
-        if first.size:
-            sign[first, second] = [(c > 0) - (c < 0) for c in exact]
-            sign[second, first] = -sign[first, second]
-        return value, sign
-
-    @property
-    def cross(self) -> FloatArray:
-        """``d_r × d_s`` of all pairs, to a relative accuracy of 1e-9 or better, (n k, n k)."""
-        return self._crosses[0]
-
-    @property
-    def cross_sign(self) -> SignArray:
-        """Exact sign of ``d_r × d_s``, shape (n k, n k)."""
-        return self._crosses[1]
-
-    @cached_property
-    def sine(self) -> FloatArray:
-        """Sine of the angle from direction r to direction s, shape (n k, n k)."""
-        return self.cross / np.outer(self.lengths, self.lengths)
-
-
-@dataclass(frozen=True, eq=False)
 class Cones:
-    """The friction cones of all edges of one object, as arrays.
+    """The friction cones of all edges of one object, or of segments of them, as arrays.
 
     Ray ``2 i`` is the clockwise boundary of the cone of edge ``i``, ray ``2 i + 1`` the
-    counter-clockwise one.
+    counter-clockwise one. Of `touching` an "edge" is a segment of an edge of the object.
 
     Parameters
     ----------
     starts, ends : numpy.ndarray, shape (n, 2)
-        First and last point of each edge, in the unit of the object.
+        First and last point of each edge, in the unit of the object; of a segment the nearest
+        doubles.
     friction : numpy.ndarray, shape (n,)
         μ of each edge.
+    edge : numpy.ndarray of int, shape (n,)
+        The edge of the object that each is a segment of.
+    lower, upper : numpy.ndarray, shape (n,)
+        The fractions of that edge at which it starts and ends: 0 and 1 of a whole edge.
+    whole_edges : Cones, optional
+        Those of all edges of the object, if these are of segments.
 
     Notes
     -----
@@ -232,6 +118,10 @@ class Cones:
     starts: FloatArray
     ends: FloatArray
     friction: FloatArray
+    edge: IntArray
+    lower: FloatArray
+    upper: FloatArray
+    whole_edges: Cones | None = None
 
     @classmethod
     def of(cls, polygon: Polygon, friction: ArrayLike) -> Cones:
@@ -246,21 +136,53 @@ class Cones:
         """
         if not isinstance(polygon, Polygon):
             raise PolygonError(f"expected a Polygon, got {type(polygon).__name__}: Polygon(points)")
+        n = polygon.n_edges
         return cls(
             polygon.edge_starts,
             polygon.edge_ends,
-            per_edge_friction(friction, polygon.n_edges),
+            per_edge_friction(friction, n),
+            np.arange(n),
+            np.zeros(n),
+            np.ones(n),
         )
+
+    def touching(self, edge: IntArray, lower: FloatArray, upper: FloatArray) -> Cones:
+        """Return the cones of segments of these edges, all that fingers may touch.
+
+        Parameters
+        ----------
+        edge : numpy.ndarray of int, shape (S,)
+            Ascending.
+        lower, upper : numpy.ndarray, shape (S,)
+            Fractions of the edge, lower < upper, read as the rationals they are. Segments of one
+            edge ascend and have no point in common.
+
+        Returns
+        -------
+        Cones
+        """
+        vectors = self.vectors[edge]
+        starts = self.starts[edge] + lower[:, None] * vectors
+        ends = self.starts[edge] + upper[:, None] * vectors
+        ends = np.where(upper[:, None] == 1, self.ends[edge], ends)
+        return Cones(starts, ends, self.friction[edge], edge, lower, upper, self)
+
+    @property
+    def whole(self) -> Cones:
+        """The cones of the whole edges: of all that `edge`, `lower` and `upper` refer to."""
+        return self if self.whole_edges is None else self.whole_edges
 
     @property
     def n_edges(self) -> int:
-        """Number of edges."""
+        """Number of edges, or segments."""
         return len(self.starts)
 
     @cached_property
     def vectors(self) -> FloatArray:
         """Vector of each edge, shape (n, 2)."""
-        return self.ends - self.starts
+        if self.whole_edges is None:
+            return self.ends - self.starts
+        return (self.upper - self.lower)[:, None] * self.whole.vectors[self.edge]
 
     @cached_property
     def lengths(self) -> FloatArray:
@@ -270,18 +192,47 @@ class Cones:
     @cached_property
     def local_starts(self) -> FloatArray:
         """First point of each edge, from the lower left corner of the bounding box."""
-        return np.asarray(self.starts - self.starts.min(axis=0))
+        if self.whole_edges is None:
+            return np.asarray(self.starts - self.corner)
+        whole = self.whole
+        moved = self.lower[:, None] * whole.vectors[self.edge]
+        return np.asarray(whole.local_starts[self.edge] + moved)
+
+    @cached_property
+    def local_ends(self) -> FloatArray:
+        """Last point of each edge, from there."""
+        if self.whole_edges is None:
+            return np.asarray(self.ends - self.corner)
+        return self.local_starts + self.vectors
+
+    @cached_property
+    def corner(self) -> FloatArray:
+        """The lower left corner of the bounding box of the object."""
+        return np.asarray(self.whole.starts.min(axis=0))
+
+    @cached_property
+    def reach(self) -> FloatArray:
+        """How far points of each (whole) edge may be from that corner, shape (n,)."""
+        whole = self.whole
+        reach = np.hypot(whole.local_starts[:, 0], whole.local_starts[:, 1]) + whole.lengths
+        return np.asarray(reach[self.edge])
 
     @cached_property
     def size(self) -> float:
         """Diagonal of the bounding box: the object's own unit of length."""
-        extent = self.starts.max(axis=0) - self.starts.min(axis=0)
+        extent = self.whole.starts.max(axis=0) - self.corner
         return float(np.hypot(extent[0], extent[1]))
 
     @cached_property
     def _exact(self) -> tuple[ObjectArray, ObjectArray, int]:
-        both, unit = as_integers(np.stack((self.starts, self.ends)))
-        return both[0], both[1] - both[0], unit
+        if self.whole_edges is None:
+            both, unit = as_integers(np.stack((self.starts, self.ends)))
+            return both[0], both[1] - both[0], unit
+        starts, vectors, unit = self.whole._exact
+        (lower, upper), parts = as_integers(np.stack((self.lower, self.upper)))
+        vectors = vectors[self.edge]
+        starts = parts * starts[self.edge] + lower[:, None] * vectors
+        return starts, (upper - lower)[:, None] * vectors, unit * parts
 
     @property
     def exact_starts(self) -> ObjectArray:
@@ -302,7 +253,7 @@ class Cones:
     def boundary(self) -> Directions:
         """The boundary rays ``rot90(T) ± μ T`` as directions."""
         slide = np.stack((self.friction, -self.friction), axis=1)
-        return Directions(self.vectors, *self._exact[1:], np.ones(slide.shape), slide)
+        return self._directions(np.ones(slide.shape), slide)
 
     @cached_property
     def lines(self) -> Directions:
@@ -310,7 +261,47 @@ class Cones:
         ones, zeros = np.ones(self.n_edges), np.zeros(self.n_edges)
         across = np.stack((ones, ones, zeros), axis=1)
         along = np.stack((self.friction, -self.friction, ones), axis=1)
-        return Directions(self.vectors, *self._exact[1:], across, along)
+        return self._directions(across, along)
+
+    def _directions(self, across: FloatArray, along: FloatArray) -> Directions:
+        """Directions to whole edges: those to their segments are the same, bit for bit."""
+        whole = self.whole
+        vectors, exact = whole.vectors[self.edge], whole.exact_vectors[self.edge]
+        return Directions(vectors, exact, whole.exact_unit, across, along)
+
+    def places(self, edges: IntArray, fractions: FloatArray) -> tuple[IntArray, FloatArray]:
+        """Return on which segments places on edges of the object are, decided exactly.
+
+        Parameters
+        ----------
+        edges, fractions : numpy.ndarray, shape (K,)
+
+        Returns
+        -------
+        segments : numpy.ndarray of int, shape (K,)
+            -1 for none.
+        fractions : numpy.ndarray, shape (K,)
+            Of the edges; places that are off a segment by no more than `FRACTION_SNAP` are now at
+            its end.
+        """
+        near = np.clip(fractions[:, None], self.lower, self.upper)
+        off = np.where(edges[:, None] == self.edge, np.abs(near - fractions[:, None]), np.inf)
+        if not self.n_edges:
+            return np.full(len(edges), -1), fractions
+        every, segments = np.arange(len(edges)), off.argmin(axis=1)
+        on = off[every, segments] <= FRACTION_SNAP
+        return np.where(on, segments, -1), np.where(on, near[every, segments], fractions)
+
+    def within(self, segments: IntArray, fractions: FloatArray) -> FloatArray:
+        """Return fractions of edges as fractions of segments of them, to the nearest double."""
+        lower, upper = self.lower[segments], self.upper[segments]
+        return np.asarray(np.clip((fractions - lower) / (upper - lower), 0.0, 1.0))
+
+    def along(self, segments: IntArray, fractions: FloatArray) -> FloatArray:
+        """Return fractions of segments as fractions of their edges, never beyond their ends."""
+        lower, upper = self.lower[segments], self.upper[segments]
+        inside = np.clip(lower + fractions * (upper - lower), lower, upper)
+        return np.asarray(np.where(fractions == 1, upper, inside))
 
     @property
     def rays(self) -> FloatArray:

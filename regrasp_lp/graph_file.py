@@ -1,7 +1,8 @@
 """A switching graph in one file.
 
 A ``.npz`` archive of numpy arrays (no pickle) with a JSON header: format "regrasp-graph",
-version 2. Torque functions are not stored but computed again from the edges of the sets.
+version 2, or 3 of a hand with limits. Torque functions are not stored but computed again from the
+edges of the sets.
 """
 
 from __future__ import annotations
@@ -21,17 +22,25 @@ from regrasp_lp.build import check_switching, switch_rule
 from regrasp_lp.errors import FileFormatError, RegraspError
 from regrasp_lp.files import write_atomically
 from regrasp_lp.friction import Cones
+from regrasp_lp.graph_options import GraphOptions
 from regrasp_lp.grasp_sets.collection import GraspSets
 from regrasp_lp.grasp_sets.families import parallel_functions
+from regrasp_lp.grasp_sets.set_pieces import SetPieces
 from regrasp_lp.grasp_sets.vertices import Family, kinds_of
 from regrasp_lp.lp import get_solver
 from regrasp_lp.planning.hand import Hand
+from regrasp_lp.planning.reach import hand_cones, spacing_of
 from regrasp_lp.polygon import Polygon
 from regrasp_lp.switches import SWITCH_ARRAYS, StoredSwitches, Switches, SwitchesOnDemand
-from regrasp_lp.switching_graph import GraphOptions, SwitchingGraph
-from regrasp_lp.torque import torque_functions
+from regrasp_lp.switching_graph import SwitchingGraph
+from regrasp_lp.torque import TorqueFunctions, torque_functions
 
 FORMAT, VERSION = "regrasp-graph", 2
+LIMITED_VERSION = 3
+"""Of graphs of a hand with limits: sets are over segments of edges, which follow from the hand."""
+
+PIECE_ARRAYS = ("piece_pieces", "piece_rows", "piece_bounds", "piece_margins")
+"""Of each kind of sets, if the hand limits the distance between fingers: see `SetPieces`."""
 
 # What numpy, zipfile, zlib and json raise on a file that is none, or not whole.
 _DAMAGED = (
@@ -62,9 +71,9 @@ def graph_to_bytes(graph: SwitchingGraph) -> bytes:
     polygon = graph.polygon
     header = {
         "format": FORMAT,
-        "version": VERSION,
+        "version": LIMITED_VERSION if graph.hand.limited else VERSION,
         "name": polygon.name,
-        "hand": {"fingers": graph.hand.fingers},
+        "hand": graph.hand.to_document(),
         "options": asdict(graph.options),
         "seconds": graph.seconds,
         "stored": isinstance(graph.switches, StoredSwitches),
@@ -81,6 +90,9 @@ def graph_to_bytes(graph: SwitchingGraph) -> bytes:
         arrays[f"{family.kind}.centers"] = family.centers
         arrays[f"{family.kind}.margins"] = family.margins
         arrays[f"{family.kind}.witnesses"] = family.witnesses
+        if family.pieces is not None:
+            for name in PIECE_ARRAYS:
+                arrays[f"{family.kind}.{name}"] = getattr(family.pieces, name[len("piece_") :])
     if isinstance(graph.switches, StoredSwitches):
         for name in SWITCH_ARRAYS:
             arrays[f"switches.{name}"] = getattr(graph.switches, name)
@@ -145,10 +157,10 @@ def graph_from_bytes(
         raise FileFormatError(f"{path}: not a graph file, or damaged: {error}") from error
     if not isinstance(header, dict) or header.get("format") != FORMAT:
         raise FileFormatError(f"{path}: not a graph file: its header does not say {FORMAT!r}")
-    if header.get("version") != VERSION:
+    if header.get("version") not in (VERSION, LIMITED_VERSION):
         raise FileFormatError(
             f"{path}: version {header.get('version')!r} of the format; this release reads "
-            f"version {VERSION}: build the graph again"
+            f"versions {VERSION} and {LIMITED_VERSION}: build the graph again"
         )
     try:
         return _graph(header, arrays, polygon)
@@ -159,11 +171,14 @@ def graph_from_bytes(
 def _graph(
     header: dict[str, Any], arrays: dict[str, np.ndarray], polygon: Polygon | None
 ) -> SwitchingGraph:
-    _check_names(set(arrays), kinds_of(header["options"]["sets"]), header["stored"])
+    spaced = "max_span" in header["hand"] or "fingertip_separation" in header["hand"]
+    kinds = kinds_of(header["options"]["sets"])
+    _check_names(set(arrays), kinds, header["stored"], PIECE_ARRAYS if spaced else ())
     if polygon is None:
         rings = np.split(arrays["vertices"], np.cumsum(arrays["ring_sizes"])[:-1])
         polygon = Polygon(rings[0], rings[1:], header["name"])
-    cones = Cones.of(polygon, arrays["friction"])
+    hand = Hand.from_document(header["hand"])
+    cones = hand_cones(polygon, arrays["friction"], hand)
     options = GraphOptions(**header["options"])
     get_solver(options.solver)
     if header["options"] != asdict(options) or not isinstance(header["seconds"], dict):
@@ -172,13 +187,14 @@ def _graph(
         _family(cones, kind, count, arrays)
         for kind, count in zip(kinds_of(options.sets), header["candidates"], strict=True)
     )
-    sets = GraspSets(polygon, families)
-    hand = Hand(header["hand"]["fingers"])
+    sets = GraspSets(polygon, families, spacing_of(cones, hand))
     check_switching(options.switching, options.sets, hand)
     switches: Switches
     if header["stored"]:
         switches = _stored(
-            len(sets), StoredSwitches(*(arrays[f"switches.{name}"] for name in SWITCH_ARRAYS))
+            len(sets),
+            StoredSwitches(*(arrays[f"switches.{name}"] for name in SWITCH_ARRAYS)),
+            0 if spaced else 1,
         )
     else:
         rule = switch_rule(
@@ -190,12 +206,15 @@ def _graph(
             min_margin=options.min_margin,
         )
         switches = SwitchesOnDemand(rule)
-    return SwitchingGraph(sets, switches, cones.friction, hand, options, header["seconds"])
+    return SwitchingGraph(sets, switches, cones.whole.friction, hand, options, header["seconds"])
 
 
-def _check_names(names: set[str], kinds: tuple[str, ...], stored: bool) -> None:
+def _check_names(
+    names: set[str], kinds: tuple[str, ...], stored: bool, pieces: tuple[str, ...]
+) -> None:
     expected = {"header", "ring_sizes", "vertices", "friction"}
-    expected |= {f"{k}.{n}" for k in kinds for n in ("edges", "centers", "margins", "witnesses")}
+    of_kinds = ("edges", "centers", "margins", "witnesses", *pieces)
+    expected |= {f"{k}.{n}" for k in kinds for n in of_kinds}
     expected |= {f"switches.{n}" for n in SWITCH_ARRAYS if stored}
     if names != expected:
         raise ValueError(f"unknown or missing arrays: {sorted(names ^ expected)}")
@@ -220,10 +239,34 @@ def _family(cones: Cones, kind: str, candidates: int, arrays: dict[str, np.ndarr
         functions = parallel_functions(cones, edges, centers)
     else:
         functions = torque_functions(cones, edges)
-    return Family(kind, functions, centers, margins, witnesses, int(candidates))
+    pieces = _pieces(functions, kind, arrays)
+    return Family(kind, functions, centers, margins, witnesses, int(candidates), pieces)
 
 
-def _stored(n: int, stored: StoredSwitches) -> StoredSwitches:
+def _pieces(
+    functions: TorqueFunctions, kind: str, arrays: dict[str, np.ndarray]
+) -> SetPieces | None:
+    if f"{kind}.{PIECE_ARRAYS[0]}" not in arrays:
+        return None
+    pieces, rows, bounds, margins = (arrays[f"{kind}.{name}"] for name in PIECE_ARRAYS)
+    count = len(pieces)
+    if not (
+        pieces.shape == (count, 3)
+        and pieces.dtype.kind == "i"
+        and rows.shape == (*bounds.shape, functions.m)
+        and len(bounds) == len(margins) == count
+        and (np.diff(pieces[:, 0]) >= 0).all()
+        and set(pieces[:, 0].tolist()) == set(range(len(functions)))
+        and ((pieces[:, 1:] >= 0) & (pieces[:, 1:] < functions.valid.shape[1])).all()
+        and np.isfinite(rows).all()
+        and np.isfinite(bounds).all()
+        and np.isfinite(margins).all()
+    ):
+        raise ValueError(f"the pieces of the {kind} sets do not fit together")
+    return SetPieces(functions, pieces, rows, bounds, margins)
+
+
+def _stored(n: int, stored: StoredSwitches, least: int) -> StoredSwitches:
     starts, others, held = stored.starts, stored.others, stored.held
     pairs, width = len(others) // 2, stored.slots.shape[1]
     if not (
@@ -234,7 +277,7 @@ def _stored(n: int, stored: StoredSwitches) -> StoredSwitches:
         and (np.diff(starts) >= 0).all()
         and starts[0] == 0
         and ((others >= 0) & (others < n)).all()
-        and ((held >= 1) & (held <= width)).all()
+        and ((held >= least) & (held <= width)).all()
         and ((stored.slots >= -1) & (stored.slots < 3)).all()
         and np.array_equal(stored.slots < 0, np.isnan(stored.points))
         and not ((stored.points < 0) | (stored.points > 1)).any()

@@ -6,14 +6,16 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from regrasp_lp.completion import complete
 from regrasp_lp.contact import Grasp
 from regrasp_lp.contact_rule import meet_held
+from regrasp_lp.couplings import best_couplings
 from regrasp_lp.friction import FloatArray, IntArray
 from regrasp_lp.grasp_sets.collection import GraspSets
 from regrasp_lp.grasp_sets.pieces import BARELY_APART
 from regrasp_lp.joins import best_joins
 from regrasp_lp.lp import GAP, Solver
-from regrasp_lp.shadows import Shadows, shadows
+from regrasp_lp.shadows import Shadows, places_of, shadows
 
 
 @dataclass(frozen=True, eq=False)
@@ -30,12 +32,16 @@ class Handover:
         which a thousandth of it may be given up).
     first, second : numpy.ndarray, shape (m,)
         Fractions of such grasps, equal in the held contacts.
+    way : int, optional
+        Which of the sets that `GraspSets.coupled` returns contains them, if the hand limits the
+        distance between fingers.
     """
 
     slots: tuple[tuple[int, int], ...]
     margin: float
     first: FloatArray
     second: FloatArray
+    way: int | None = None
 
     @property
     def held(self) -> int:
@@ -86,6 +92,69 @@ class Switch:
         return self.grasps[best]
 
 
+def every_handover(
+    sets: GraspSets,
+    solver: Solver,
+    first: int,
+    second: int,
+    held: tuple[int, int],
+    min_margin: float = 0.0,
+) -> Switch:
+    """Return all ways to switch between two adjacent sets.
+
+    Parameters
+    ----------
+    sets : GraspSets
+    solver : Solver
+    first, second : int
+        Numbers of the two sets.
+    held : (int, int)
+        The least and the largest number of contacts to hold.
+    min_margin : float
+        Ways of larger margin only, unless there is none.
+    """
+    least, most = held
+    every = [
+        handover
+        for number in range(most, least - 1, -1)
+        for handover in handovers(sets, solver, first, second, number)
+    ]
+    found = [h for h in every if h.margin > min_margin] or every[:1]
+    edges = sets[first].edges
+    return Switch(
+        first,
+        second,
+        tuple(tuple(edges[here] for here, _ in h.slots) for h in found),
+        tuple((sets.grasp(first, h.first), sets.grasp(second, h.second)) for h in found),
+        tuple(found),
+    )
+
+
+def witnesses(
+    sets: GraspSets, first: int, second: int, held: tuple[IntArray, FloatArray] | None
+) -> tuple[Grasp, Grasp]:
+    """Return two grasps, one in each set, that are equal in the contacts that a switch can hold.
+
+    Parameters
+    ----------
+    sets : GraspSets
+    first, second : int
+        Numbers of the two sets.
+    held : (numpy.ndarray of int, numpy.ndarray) or None
+        Which contacts of the set with the smaller number are held and where (`Switches.witness`).
+    """
+    low, high = sorted((first, second))
+    slots, points = held or (np.zeros(0, dtype=np.int8), np.zeros(0))
+    edges = sets.functions(low).edges[0, slots]
+    grasps = {}
+    for index in (low, high):
+        functions = sets.functions(index)
+        there = places_of(edges[None, :], functions.edges)
+        fractions = complete(functions, there, points[None, :])
+        grasps[index] = sets.grasp(index, fractions[0])
+    return grasps[first], grasps[second]
+
+
 def handovers(
     sets: GraspSets, solver: Solver, first: int, second: int, held: int
 ) -> list[Handover]:
@@ -108,14 +177,16 @@ def handovers(
         A switch that exists only within rounding may have a margin that is not
         positive, and grasps that only nearly hold.
     """
-    if held == 0:
+    if held == 0 and sets.spacing is None:
         margin = float(min(sets.margins[first], sets.margins[second]))
-        return [Handover((), margin, *(_witness(sets, i) for i in (first, second)))]
+        return [Handover((), margin, _witness(sets, first), _witness(sets, second))]
     one, other = (_projections(sets, index, held) for index in (first, second))
     if not (len(one) and len(other)):
         return []
     i, j = np.nonzero((one.edges[:, None, :] == other.edges[None, :, :]).all(axis=2))
     one, other = one.take(i), other.take(j)
+    if sets.spacing is not None:
+        return _spaced(sets, solver, one, other)
     joins = best_joins(one, other, solver, apart=BARELY_APART)
     feasible = meet_held(one, other, solver=solver).exist
     if feasible.any() and not np.isfinite(joins.margins[feasible]).any():
@@ -135,6 +206,22 @@ def handovers(
     # What exists is decided without regard to the order of two contacts on one edge; a choice of
     # slots that exists in the other order only has a negative margin here.
     return [h for h in found if h.margin > 0] or found[:1]
+
+
+def _spaced(sets: GraspSets, solver: Solver, one: Shadows, other: Shadows) -> list[Handover]:
+    """The same for a hand that limits the distance between fingers."""
+    best = best_couplings(sets, one, other, solver)
+    found = [
+        Handover(
+            tuple(zip(one.slots[n].tolist(), other.slots[n].tolist(), strict=True)),
+            float(best.margins[n]),
+            best.first[n, : one.sources[one.source[n]].m],
+            best.second[n, : other.sources[other.source[n]].m],
+            int(best.choices[n]),
+        )
+        for n in np.flatnonzero(best.margins > 0)
+    ]
+    return sorted(found, key=lambda h: (-h.margin, h.slots))
 
 
 def _projections(sets: GraspSets, index: int, held: int) -> Shadows:

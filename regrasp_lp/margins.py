@@ -27,6 +27,59 @@ _CHUNK = 20_000
 _TIED = 1e-12  # of the slopes: contacts that make the same difference, but for rounding
 
 
+def largest_margins(
+    alpha: FloatArray,
+    a: FloatArray,
+    beta: FloatArray,
+    b: FloatArray,
+    ends: FloatArray | None = None,
+) -> FloatArray:
+    """Return ``max ε  s.t.  β + b·f + ε <= 0 <= α + a·f - ε,  0 <= f <= 1``, of many at once.
+
+    For tolerances the box shrinks, too, ``ε e_i <= f_i <= 1 - ε e_i``: then the multiplier y bounds
+    ε by the value above over ``1 + Σ_i e_i |y a_i - (1 - y) b_i|``, a quotient of piecewise linear
+    functions of y, which is least at a breakpoint as well.
+
+    Parameters
+    ----------
+    alpha, beta : numpy.ndarray, shape (...)
+    a, b : numpy.ndarray, shape (..., m)
+        Not negative.
+    ends : numpy.ndarray, shape (..., m), optional
+        ``e``: 1 over the length of the edge; 0 where an end does not count.
+
+    Returns
+    -------
+    numpy.ndarray, shape (...)
+
+    Examples
+    --------
+    >>> line = np.array(-1.0), np.array([3.0]), np.array(-1.0), np.array([1.0])
+    >>> float(largest_margins(*line)), float(largest_margins(*line, ends=np.array([0.5])))
+    (0.5, 0.5)
+    """
+    m = a.shape[-1]
+
+    def value(y: FloatArray | float) -> FloatArray:
+        total, rate = y * alpha - (1 - y) * beta, np.asarray(1.0)
+        for i in range(m):
+            lift = y * a[..., i] - (1 - y) * b[..., i]
+            total = total + np.maximum(0.0, lift)
+            if ends is not None:
+                rate = rate + ends[..., i] * np.abs(lift)
+        return np.asarray(total if ends is None else total / rate)
+
+    best = np.minimum(value(0.0), value(1.0))
+    for i in range(m):
+        both = a[..., i] + b[..., i]
+        y = np.divide(b[..., i], both, out=np.zeros(both.shape), where=both > 0)
+        best = np.minimum(best, value(y))
+    if ends is not None:
+        half = np.divide(0.5, ends, out=np.full(ends.shape, np.inf), where=ends > 0)
+        best = np.minimum(best, half.min(axis=-1))
+    return np.asarray(best)
+
+
 def piece_margins(functions: TorqueFunctions) -> FloatArray:
     """Return the largest margin on every piece (j, k) of every set.
 
@@ -41,20 +94,12 @@ def piece_margins(functions: TorqueFunctions) -> FloatArray:
         Entry (j, k): the optimum ε* of the piece ``{M_j < 0 < M_k}``, a signed length; -inf for
         j = k, for padding and where the rays do not span.
     """
-    alpha, a = functions.offsets[:, None, :], functions.slopes[:, None, :, :]
-    beta, b = functions.offsets[:, :, None], functions.slopes[:, :, None, :]
-
-    def value(y: FloatArray) -> FloatArray:
-        total = y * alpha - (1 - y) * beta
-        for i in range(functions.m):
-            total = total + np.maximum(0.0, y * a[..., i] - (1 - y) * b[..., i])
-        return np.asarray(total)
-
-    best = np.minimum(-beta, alpha + a.sum(axis=-1))  # y = 0 and y = 1: slopes are not negative
-    for i in range(functions.m):
-        both = a[..., i] + b[..., i]
-        y = np.divide(b[..., i], both, out=np.zeros(both.shape), where=both > 0)
-        best = np.minimum(best, value(y))
+    best = largest_margins(
+        functions.offsets[:, None, :],
+        functions.slopes[:, None, :, :],
+        functions.offsets[:, :, None],
+        functions.slopes[:, :, None, :],
+    )
     j = functions.valid.shape[1]
     pairs = functions.valid[:, :, None] & functions.valid[:, None, :] & ~np.eye(j, dtype=bool)
     return np.where(pairs & functions.spans[:, None, None], best, -np.inf)
@@ -105,8 +150,29 @@ def best_points(functions: TorqueFunctions, pieces: IntArray) -> FloatArray:
     """
     every = np.arange(len(functions))
     j, k = pieces.T
-    alpha, a = functions.offsets[every, k], functions.slopes[every, k]
-    beta, b = functions.offsets[every, j], functions.slopes[every, j]
+    return optimal_points(
+        functions.offsets[every, k],
+        functions.slopes[every, k],
+        functions.offsets[every, j],
+        functions.slopes[every, j],
+    )
+
+
+def optimal_points(
+    alpha: FloatArray, a: FloatArray, beta: FloatArray, b: FloatArray
+) -> FloatArray:
+    """Return where the optima of `largest_margins` are attained, as `best_points` chooses them.
+
+    Parameters
+    ----------
+    alpha, beta : numpy.ndarray, shape (N,)
+    a, b : numpy.ndarray, shape (N, m)
+
+    Returns
+    -------
+    numpy.ndarray, shape (N, m)
+    """
+    every = np.arange(len(alpha))
     both = a + b
     moves = both > 0
     ends = np.divide(b, both, out=np.zeros(b.shape), where=moves)

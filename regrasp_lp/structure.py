@@ -66,8 +66,8 @@ def structure(sets: GraspSets, switches: Switches, hand: Hand) -> Structure:
         component = united(component, i, j)
         same = kinds[i] == kinds[j]
         within = united(within, i[same], j[same])
-        holds = hand.needs[contacts[i], contacts[j]] > 0
-        listed.append(i[holds].astype(np.int64) * n + j[holds])
+        counted = ~hand.adjacent[contacts[i], contacts[j]]
+        listed.append(i[counted].astype(np.int64) * n + j[counted])
     keys = np.concatenate(listed)
     keys.sort()  # a pair may come again
     count += len(keys) - int(np.count_nonzero(keys[1:] == keys[:-1]))
@@ -80,7 +80,7 @@ def _implicit(contacts: IntArray, hand: Hand) -> tuple[int, list[tuple[IntArray,
     joins: list[tuple[IntArray, IntArray]] = []
     for a, b in ((2, 2), (2, 3), (3, 3)):
         one, other = np.flatnonzero(contacts == a), np.flatnonzero(contacts == b)
-        if hand.needs[a, b] or not one.size or not other.size:
+        if not hand.adjacent[a, b] or not one.size or not other.size:
             continue
         if a == b:
             count += len(one) * (len(one) - 1) // 2

@@ -129,10 +129,15 @@ class SwitchRule:
 
     @cached_property
     def _levels(self) -> tuple[_Level, ...]:
-        """The projections on 1, 2 and 3 contacts, grouped by edges; those that can matter."""
+        """The projections on 1, 2 and 3 contacts, grouped by edges; those that can matter.
+
+        Where two grasps need to have nothing in common they are adjacent, unless the hand limits
+        the distance between their fingers: then that is a question, too. So is which of two
+        contacts on one edge is held, for they are then in order.
+        """
         return tuple(
-            _Level.of(shadows(self.sources, held), self)
-            for held in (1, 2, 3)
+            _Level.of(shadows(self.sources, held, ordered=self.hand.spaced), self)
+            for held in range(0 if self.hand.spaced else 1, 4)
             if any(
                 held <= min(f.m, g.m) and held >= self.hand.needs[f.m, g.m]
                 for f in self.sources

@@ -104,6 +104,33 @@ def meet(
     return result
 
 
+def certainly_apart(first: Shadows, second: Shadows, i: IntArray, j: IntArray) -> BoolArray:
+    """Whether projections have no common point for certain, in floating point alone, (P,).
+
+    Unlike `meet` it asks only the arrays of the projections, not the sets behind them, so that
+    these arrays may have been shifted.
+
+    Parameters
+    ----------
+    first, second : Shadows
+    i, j : numpy.ndarray of int, shape (P,)
+        As for `meet`.
+    """
+    apart = np.zeros(len(i), dtype=bool)
+    for start in range(0, len(i), _CHUNK):
+        rows = np.arange(start, min(start + _CHUNK, len(i)))
+        unknown = Meeting.unknown(len(i), first.held)
+        open_ = rows[_seen(first, second, i[rows], j[rows], rows, unknown)]
+        pair = first.take(i[open_]), second.take(j[open_])
+        if first.held == 1:
+            apart[open_] = certain_reasons(*pair).any(axis=1)
+        elif open_.size:
+            apart[open_] = _bad_between_positions(*pair)
+            left = np.flatnonzero(~apart[open_])
+            apart[open_[left]] = _covered(bad_intervals((pair[0].take(left), pair[1].take(left))))
+    return apart
+
+
 def _seen(
     first: Shadows, second: Shadows, i: IntArray, j: IntArray, rows: IntArray, result: Meeting
 ) -> IntArray:

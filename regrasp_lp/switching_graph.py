@@ -2,58 +2,42 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterable, Iterator
 from dataclasses import dataclass
 from functools import cached_property, partial
+from itertools import islice
 from pathlib import Path
 from typing import TYPE_CHECKING
 
 import numpy as np
 
-from regrasp_lp.completion import complete
 from regrasp_lp.contact import Grasp
-from regrasp_lp.errors import NoPlanFound
-from regrasp_lp.friction import Cones, FloatArray
+from regrasp_lp.friction import FloatArray
+from regrasp_lp.graph_options import GraphOptions
 from regrasp_lp.grasp_sets.collection import GraspSets
-from regrasp_lp.handovers import Switch, handovers
+from regrasp_lp.handovers import Switch, every_handover, witnesses
 from regrasp_lp.lp import Solver, get_solver
 from regrasp_lp.planning.hand import Hand
-from regrasp_lp.planning.on_demand import problem_on_demand
+from regrasp_lp.planning.objective import ObjectiveLike
 from regrasp_lp.planning.plan import Plan
-from regrasp_lp.planning.planner import (
-    GraspLike,
-    PlanningProblem,
-    check_aligning,
-    checked_grasp,
-)
+from regrasp_lp.planning.planner import PlanningProblem
+from regrasp_lp.planning.requests import GraspLike
+from regrasp_lp.planning.steering import Weight
 from regrasp_lp.polygon import Polygon
-from regrasp_lp.shadows import places_of
+from regrasp_lp.queries import check_count, plans_in
 from regrasp_lp.structure import Structure, structure
 from regrasp_lp.summary import KindCounts, Summary
-from regrasp_lp.switches import (
-    SWITCH_ARRAYS,
-    StoredSwitches,
-    Switches,
-    SwitchesOnDemand,
-)
+from regrasp_lp.switches import SWITCH_ARRAYS, StoredSwitches, Switches, SwitchesOnDemand
 
 if TYPE_CHECKING:
     import networkx as nx
 
+    from regrasp_lp.explanation import Explanation
+    from regrasp_lp.planning.path_set import PathSet
+
 Progress = Callable[[str, int, int], None]
 
 _equal = partial(np.array_equal, equal_nan=True)
-
-
-@dataclass(frozen=True)
-class GraphOptions:
-    """How a graph was built; see `build_switching_graph`."""
-
-    sets: str = "complete"
-    switching: str = "contact"
-    min_margin: float = 0.0
-    solver: str = "clarabel"
-    presolve: bool = True
 
 
 @dataclass(frozen=True, eq=False)
@@ -155,7 +139,7 @@ class SwitchingGraph:
         if found.size:
             return int(found[0])
         contacts = self.sets.contacts
-        return 0 if self.hand.held(contacts[first], contacts[second]) == 0 else None
+        return 0 if self.hand.adjacent[contacts[first], contacts[second]] else None
 
     def switch(self, first: int, second: int) -> Switch | None:
         """Return all ways to switch between two sets, or None if there is none.
@@ -177,27 +161,14 @@ class SwitchingGraph:
         most = self.held(first, second)
         if most is None:
             return None
-        contacts = self.sets.contacts
-        least = self.hand.held(contacts[first], contacts[second])
-        every = [
-            handover
-            for held in range(most, least - 1, -1)
-            for handover in handovers(self.sets, self._solver, first, second, held)
-        ]
-        found = [h for h in every if h.margin > self.options.min_margin] or every[:1]
-        edges = self.sets[first].edges
-        return Switch(
-            first,
-            second,
-            tuple(tuple(edges[here] for here, _ in h.slots) for h in found),
-            tuple(
-                (self.sets.grasp(first, h.first), self.sets.grasp(second, h.second)) for h in found
-            ),
-            tuple(found),
-        )
+        least = self.hand.held(*self.sets.contacts[[first, second]].tolist())
+        margin = self.options.min_margin
+        return every_handover(self.sets, self._solver, first, second, (least, most), margin)
 
     def witness(self, first: int, second: int) -> tuple[Grasp, Grasp] | None:
-        """Return two grasps that prove a switch, or None if there is none. No program is solved.
+        """Return two grasps that prove a switch, or None if there is none.
+
+        No program is solved, unless the hand limits the distance between fingers.
 
         Parameters
         ----------
@@ -217,18 +188,11 @@ class SwitchingGraph:
         """
         if self.held(first, second) is None:
             return None
-        low, high = sorted((first, second))
-        found = self.switches.witness(low, high)
-        slots, points = found or (np.zeros(0, dtype=np.int8), np.zeros(0))
-        edges = np.array(self.sets[low].edges)[slots]
-        grasps = {}
-        for index in (low, high):
-            family, row = self.sets.place(index)
-            functions = self.sets.families[family].functions.take(np.array([row]))
-            there = places_of(edges[None, :], functions.edges)
-            fractions = complete(functions, there, points[None, :])
-            grasps[index] = self.sets.grasp(index, fractions[0])
-        return grasps[first], grasps[second]
+        if self.sets.spacing is not None:
+            switch = self.switch(first, second)
+            return None if switch is None else switch.witnesses
+        found = self.switches.witness(*sorted((first, second)))
+        return witnesses(self.sets, first, second, found)
 
     def neighbors(self, index: int) -> list[int]:
         """Return the numbers of all adjacent sets, ascending.
@@ -246,7 +210,7 @@ class SwitchingGraph:
         adjacent = np.zeros(len(self), dtype=bool)
         adjacent[self.switches.neighbors(index)[0]] = True
         for m in (2, 3):
-            if self.hand.held(int(self.sets.contacts[index]), m) == 0:
+            if self.hand.adjacent[self.sets.contacts[index], m]:
                 adjacent |= self.sets.contacts == m
         adjacent[index] = False
         found: list[int] = np.flatnonzero(adjacent).tolist()
@@ -293,26 +257,9 @@ class SwitchingGraph:
         Nodes carry ``kind``, ``edges``, ``center`` and ``margin``; edges carry ``held``, the
         largest number of contacts that the switch can hold.
         """
-        import networkx as nx
+        from regrasp_lp.networks import networkx_graph
 
-        graph: nx.Graph[int] = nx.Graph(name=self.polygon.name)
-        for index, grasp_set in enumerate(self.sets):
-            graph.add_node(
-                index,
-                kind=grasp_set.kind,
-                edges=grasp_set.edges,
-                center=grasp_set.center,
-                margin=grasp_set.margin,
-            )
-        for index in range(len(self)):
-            others, held = self.switches.neighbors(index)
-            listed = dict(zip(others.tolist(), held.tolist(), strict=True))
-            graph.add_edges_from(
-                (index, other, {"held": listed.get(other, 0)})
-                for other in self.neighbors(index)
-                if other > index
-            )
-        return graph
+        return networkx_graph(self)
 
     def save(self, path: str | Path) -> None:
         """Write the graph to one file, whole or not at all (`load_graph` reads it)."""
@@ -329,8 +276,17 @@ class SwitchingGraph:
 
         save_certificates(self, path)
 
-    def plan(self, start: GraspLike, goal: GraspLike, aligning: str = "slide") -> Plan:
-        """Return a verified plan with the fewest placements from one grasp to another.
+    def plan(
+        self,
+        start: GraspLike,
+        goal: GraspLike,
+        aligning: str = "slide",
+        objective: ObjectiveLike = "placements",
+        weight: Weight | None = None,
+        avoid_edges: Iterable[int] = (),
+        avoid_sets: Iterable[int] = (),
+    ) -> Plan:
+        """Return the best verified plan from one grasp to another.
 
         Parameters
         ----------
@@ -341,10 +297,26 @@ class SwitchingGraph:
             The latter places fingers too; of a path with the fewest placements for switching and
             one over two-finger sets, both without detours, the better plan is taken, which need
             not be the best of all.
+        objective : {"placements", "margin", "tolerance", "travel"} or mapping of these to weights
+            What the plan is best in: fewest placements (then largest least margin of its sets,
+            then smaller set numbers); largest least margin or tolerance over all that can be
+            chosen (then fewest placements, then the second least margin, and so on); least travel
+            (then fewest placements). Weights make a cost: placements and travel, less margin and
+            tolerance, each times its weight.
+        weight : callable, optional
+            Instead of an objective: ``weight(u, v, data)``, as in networkx, is what a switch from
+            set u to set v counts, a number >= 0, or None to hide it. `data` has ``held`` of the
+            switch and ``kind``, ``edges``, ``center``, ``margin`` of v, as `to_networkx` has them.
+            The sum is least; then as for placements. It is no quantity of a plan: there is no
+            bound.
+        avoid_edges, avoid_sets : iterable of int
+            No plan passes through these sets, or through any over these edges; it may only begin
+            or end with those that hold the start or the goal. Bounds are of such plans.
 
         Returns
         -------
         Plan
+            With `Plan.bound` and `Plan.gap`: how far from the best it can be.
 
         Raises
         ------
@@ -355,41 +327,88 @@ class SwitchingGraph:
         SolverError
             If a solver stopped early.
         """
-        check_aligning(aligning)
-        grasps = {
-            role: checked_grasp(self.polygon, grasp, self.friction, self.hand, role)
-            for role, grasp in (("start", start), ("goal", goal))
-        }
-        where = {role: self.locate(grasp) for role, grasp in grasps.items()}
-        for role, found in where.items():
-            if not found:
-                raise NoPlanFound(
-                    f"no plan exists among these sets: the {role} is in none of the "
-                    f"{len(self)} {self.options.sets} sets" + self._why_in_no_set()
-                )
-        problem = PlanningProblem(self.sets, self.switches, self.hand, self.friction, self._solver)
-        if self._too_large_to_search:
-            nearer = problem_on_demand(
-                self.polygon,
-                self._cones,
-                self._solver,
-                grasps["start"],
-                grasps["goal"],
-                all_pairs=aligning == "regrip",
-            )
-            problem = problem if nearer is None else nearer
-        plan = problem.plan(grasps["start"], grasps["goal"], aligning)
-        if plan is None:
-            raise NoPlanFound(
-                f"no plan exists among these sets: {self._component_text('start', where['start'])}"
-                f", {self._component_text('goal', where['goal'])}, of "
-                f"{len(self.components())} components"
-            )
-        return plan
+        nearby = self._too_large_to_search
+        steering = weight, avoid_edges, avoid_sets
+        request = start, goal, aligning, objective, *steering
+        return next(plans_in(self, self._problem, *request, nearby=nearby))
 
-    @property
-    def _cones(self) -> Cones:
-        return self.sets.families[0].functions.cones
+    def plans(
+        self,
+        start: GraspLike,
+        goal: GraspLike,
+        k: int = 5,
+        aligning: str = "slide",
+        objective: ObjectiveLike = "placements",
+        weight: Weight | None = None,
+        avoid_edges: Iterable[int] = (),
+        avoid_sets: Iterable[int] = (),
+    ) -> list[Plan]:
+        """Return up to k verified plans along different paths of sets, the best first.
+
+        The first is as good as that of `plan`, and the same where switches are stored. For fewest
+        placements, or least weight, they follow the k shortest paths that pass through no set
+        twice, in that order; with ``aligning="regrip"`` by the placements for switching alone. For
+        margin or tolerance they are in the order of these, to the accuracy of linear programs.
+        Each has the bound of the first. A path that no plan leads along within rounding, or only
+        one with the steps of a better plan, is left out.
+
+        Parameters
+        ----------
+        start, goal, aligning, weight, avoid_edges, avoid_sets
+            As for `plan`.
+        k : int
+        objective : {"placements", "margin", "tolerance"}
+
+        Returns
+        -------
+        list of Plan
+            Fewer than k if there are no more.
+
+        Raises
+        ------
+        NoPlanFound, NotForceClosureError, ContactError, HandError, OptionError, SolverError
+            As for `plan`.
+        """
+        check_count(k, objective)
+        steering = weight, avoid_edges, avoid_sets
+        request = start, goal, aligning, objective, *steering
+        return list(islice(plans_in(self, self._problem, *request), k))
+
+    def path_set(
+        self, nodes: Iterable[int], start: GraspLike | None = None, goal: GraspLike | None = None
+    ) -> PathSet:
+        """Return the best convex set of contact choices along a path: the first of `path_sets`."""
+        return next(self.path_sets(nodes, start, goal))
+
+    def path_sets(
+        self, nodes: Iterable[int], start: GraspLike | None = None, goal: GraspLike | None = None
+    ) -> Iterator[PathSet]:
+        """Yield the convex sets whose union is all contact choices along a path of sets.
+
+        Fewest placements first; then the largest least margin (`planning.path_sets`).
+
+        Parameters
+        ----------
+        nodes : iterable of int
+            Numbers of sets, each adjacent to the next one.
+        start, goal : Grasp or iterable of (edge, position), optional
+            Grasps in the first and in the last set; by default free to choose.
+        """
+        from regrasp_lp.planning.path_sets import path_sets
+
+        return path_sets(self._problem, self.held, nodes, start, goal)
+
+    def explain(
+        self, start: GraspLike, goal: GraspLike, progress: Progress | None = None
+    ) -> Explanation:
+        """Tell why there is no plan between two grasps, and what would help (`why_not.explain`)."""
+        from regrasp_lp.why_not import explain_in
+
+        return explain_in(self, start, goal, progress)
+
+    @cached_property
+    def _problem(self) -> PlanningProblem:
+        return PlanningProblem(self.sets, self.switches, self.hand, self.friction, self._solver)
 
     @property
     def _too_large_to_search(self) -> bool:
@@ -397,17 +416,3 @@ class SwitchingGraph:
         options = GraphOptions(solver=self.options.solver, presolve=self.options.presolve)
         on_demand = isinstance(self.switches, SwitchesOnDemand)
         return on_demand and self.hand == Hand(4) and self.options == options
-
-    def _why_in_no_set(self) -> str:
-        if self.options.min_margin:
-            return f" with a margin above {self.options.min_margin:g}"
-        return ', which do not cover all force-closure grasps: use sets="complete"'
-
-    def _component_text(self, role: str, found: tuple[int, ...]) -> str:
-        components = self.components()
-        inside = [
-            f"component {number} ({len(component)} sets)"
-            for number, component in enumerate(components)
-            if component & set(found)
-        ]
-        return f"the {role} is in {' and '.join(inside)}"

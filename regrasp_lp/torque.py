@@ -11,7 +11,8 @@ contacts are in force closure iff the rays positively span the plane and
 ``docs/theory.md``. Everything here is stacked: a row is a combination of edges, a column one of
 its functions.
 
-Positions are *fractions* ``f = u / l`` in [0, 1]. Values are divided by ``s = Σ w_t |e_t|`` and so
+Positions are *fractions* ``f = u / l`` in [0, 1], of edges or of the segments of them that fingers
+may touch (`Cones.touching`). Values are divided by ``s = Σ w_t |e_t|`` and so
 are lengths: by how much all boundary lines may be shifted before the sign changes.
 """
 
@@ -94,12 +95,27 @@ class TorqueFunctions:
         """Length of the edge of each contact, shape (N, m)."""
         return self.cones.lengths[self.edges]
 
+    @property
+    def first_positions(self) -> FloatArray:
+        """Where on its whole edge the segment of each contact starts, a length, shape (N, m)."""
+        cones = self.cones
+        return np.asarray((cones.lower * cones.whole.lengths[cones.edge])[self.edges])
+
+    @property
+    def whole(self) -> TorqueFunctions:
+        """The same functions of fractions of whole edges, where these are of segments of them."""
+        cones = self.cones
+        if cones.whole is cones:
+            return self
+        ray = np.where(self.ray >= 0, 2 * cones.edge[self.ray // 2] + self.ray % 2, -1)
+        terms = self.spans, self.slot, ray.astype(np.int32), self.weight, self.scale
+        return TorqueFunctions(cones.whole, cones.edge[self.edges], *terms)
+
     @cached_property
     def _terms(self) -> tuple[FloatArray, FloatArray, FloatArray]:
         cones, rows = self.cones, np.arange(len(self))[:, None]
         offset, magnitude = np.zeros(self.valid.shape), np.zeros(self.valid.shape)
         slopes = np.zeros((*self.valid.shape, self.m))
-        reach = np.hypot(cones.local_starts[:, 0], cones.local_starts[:, 1]) + cones.lengths
         for t in range(3):
             ray, slot = self.ray[:, :, t], self.slot[:, :, t]
             edge = self.edges[rows, slot]
@@ -109,7 +125,7 @@ class TorqueFunctions:
             turn = cross(cones.vectors[edge], force)
             for i in range(self.m):
                 slopes[:, :, i] += np.where(slot == i, turn, 0.0)
-            magnitude += np.where(ray >= 0, reach[edge], 0.0)
+            magnitude += np.where(ray >= 0, cones.reach[edge], 0.0)
         return offset, np.maximum(slopes, 0.0), _ROUNDINGS * magnitude / self.scale
 
     @property

@@ -88,7 +88,7 @@ def test_help_fits_a_terminal(run: Run, command: Sequence[str]) -> None:
 def test_help_of_plan_names_every_option(run: Run) -> None:
     out = run("plan", "--help")[1]
     options = "name friction start start-xy goal goal-xy tolerance fingers sets aligning solver"
-    for option in [*options.split(), "json", "plot"]:
+    for option in [*options.split(), "objective", "sensitivity", "json", "plot"]:
         assert re.search(rf"^  --{option}\b", out, re.MULTILINE), option
 
 
@@ -139,6 +139,15 @@ def test_plan_prints_an_account(run: Run) -> None:
     assert max(map(len, out.splitlines())) <= 80
 
 
+def test_plan_prints_its_sensitivity_when_asked(run: Run) -> None:
+    code, out, err = run(*RECTANGLE, *TWO_GRASPS, "--sensitivity")
+    assert (code, err) == (0, "")
+    account, sensitivity = out.split("\nWhat limits the regrasp of rectangle\n")
+    assert run(*RECTANGLE, *TWO_GRASPS)[1] == account
+    assert "the plan holds under any friction" in " ".join(sensitivity.split())
+    assert max(map(len, out.splitlines())) <= 80
+
+
 def test_plan_takes_points_with_negative_coordinates(run: Run, tmp_path: Path) -> None:
     (tmp_path / "block.wkt").write_text("POLYGON ((-3 -1, 3 -1, 3 1, -3 1, -3 -1))")
     common = ["plan", "block.wkt", "--friction", "0.4", "--goal", "1:1,3:1"]
@@ -183,6 +192,33 @@ def test_friction_hand_and_alignment_reach_the_plan(run: Run) -> None:
         assert run(*RECTANGLE, *apart, "--aligning", aligning)[0] == 0
         steps = rl.read_plan("plan.json").steps
         assert any(isinstance(step, rl.Slide) for step in steps) == slides
+
+
+@pytest.mark.parametrize("solver", ["clarabel", "highs"])
+def test_the_objective_reaches_the_plan_and_its_account(run: Run, solver: str) -> None:
+    apart = ["--start", "0:5,0:40,2:40", "--goal", "1:15,3:15", "--solver", solver]
+    polygon = next(p for p in rl.read_polygons("parts.geojson") if p.name == "rectangle")
+    graph = rl.build_switching_graph(polygon, 0.4, solver=solver)
+    grasps = [(0, 5), (0, 40), (2, 40)], [(1, 15), (3, 15)]
+    accounts = set()
+    for text, objective in (
+        ("margin", "margin"),
+        ("travel", "travel"),
+        ("placements=1, travel=0.2", {"placements": 1, "travel": 0.2}),
+    ):
+        code, out, err = run(*RECTANGLE, *apart, "--objective", text, "--json", "plan.json")
+        assert (code, err) == (0, "")
+        plan = graph.plan(*grasps, objective=objective)
+        assert out.startswith(f"{plan}\n")
+        assert rl.read_plan("plan.json") == plan
+        accounts.add(next(line for line in out.splitlines() if line.startswith("objective ")))
+    assert len(accounts) == 3
+    code, out, _ = run(*RECTANGLE, *apart, "--objective", "margin", "--alternatives", "3")
+    assert code == 0
+    assert "3 plans, the best:" in out
+    code, _, err = run(*RECTANGLE, *apart, "--objective", "travel", "--alternatives", "3")
+    assert code == 2
+    assert "alternatives are found for" in err
 
 
 def test_the_only_polygon_of_a_file_needs_no_name(run: Run, tmp_path: Path) -> None:
@@ -339,12 +375,38 @@ def test_digits_are_kept_where_the_margin_needs_them() -> None:
 )
 def test_no_plan(run: Run, options: list[str], reason: str) -> None:
     code, out, err = run(*RECTANGLE, *options, "--json", "plan.json", "--plot", "plan.png")
-    assert (code, out) == (1, "")
+    assert code == 1
+    # the full explanation, where start and goal are known
+    assert out.startswith("No plan: ") if "--goal" in [*RECTANGLE, *options] else out == ""
     assert_one_line(err)
     assert err.startswith("regrasp-lp plan: no ")
     assert reason in err
     assert not Path("plan.json").exists()
     assert not Path("plan.png").exists()
+
+
+def test_what_would_help_is_said(run: Run) -> None:
+    code, out, _ = run(*RECTANGLE, *TWO_GRASPS, "--fingers", "3")
+    assert code == 1
+    labels = [line[:10].rstrip() for line in out.splitlines()[2:] if line[0] != " "]
+    assert labels == ["start", "goal", "switch", "friction", "fingers"]
+    assert "with 4 there is a plan of 2 placements" in out
+    polygon = next(p for p in rl.read_polygons("parts.geojson") if p.name == "rectangle")
+    friction = RECTANGLE[RECTANGLE.index("--friction") + 1]
+    start, goal = (values.grasp(TWO_GRASPS[i]) for i in (1, 3))
+    assert out == f"{rl.explain(polygon, start, goal, float(friction), rl.Hand(3))}\n"
+
+
+def test_the_search_for_what_would_help_is_shown(run: Run, monkeypatch: pytest.MonkeyPatch) -> None:
+    terminal = Terminal()
+    original = ProgressBar.__init__
+    monkeypatch.setattr("regrasp_lp.cli.progress._REDRAW", 0.001)
+    monkeypatch.setattr(ProgressBar, "__init__", lambda bar: original(bar, terminal, after=0.0))
+    code, out, err = run(*RECTANGLE, *TWO_GRASPS, "--fingers", "3")
+    assert code == 1
+    assert_one_line(err)
+    assert "times the friction" in terminal.getvalue()
+    assert "\r" not in out
 
 
 def test_no_grasp_at_all(run: Run, tmp_path: Path) -> None:
@@ -360,6 +422,7 @@ def test_no_grasp_at_all(run: Run, tmp_path: Path) -> None:
 
 # --- errors: exit code 2, one line --------------------------------------------------------------
 
+OBJECTIVES = '"placements", "margin", "tolerance", "travel"'
 CONTACTS_FORM = "write contacts as edge:position separated by commas, as in 4:0.3,0:1.2"
 PARTS = ["plan", "parts.geojson", "--friction", "0.3"]
 FOCUS = ["table", "parts.geojson", "--switching", "focus"]
@@ -414,6 +477,13 @@ FOCUS = ["table", "parts.geojson", "--switching", "focus"]
         ([*RECTANGLE, "--sets", "all"], "choose from 'complete', 'chapter'"),
         ([*RECTANGLE, "--solver", "glpk"], "choose from 'clarabel', 'highs'"),
         ([*RECTANGLE, "--aligning", "jump"], "choose from 'slide', 'regrip'"),
+        ([*RECTANGLE, "--objective", "speed"], f"must be one of {OBJECTIVES}, got 'speed'"),
+        ([*RECTANGLE, "--objective", "travl=1"], f"must be one of {OBJECTIVES}, got 'travl'"),
+        ([*RECTANGLE, "--objective", "margin=1,travel"], "'travel' is no weight; write each once"),
+        ([*RECTANGLE, "--objective", "margin=1,margin=2"], "'margin=2' is no weight"),
+        ([*RECTANGLE, "--objective", "margin=x"], "'margin=x' is no weight"),
+        ([*RECTANGLE, "--objective", "margin=-1"], "the weight of 'margin' must be a number >= 0"),
+        ([*RECTANGLE, "--objective", "margin=0"], "all weights of the objective are 0"),
         (PARTS, "parts.geojson holds 8 polygons: choose one with --name, of rectangle, l_br"),
         (["show", "parts.geojson"], "holds 8 polygons"),
         ([*PARTS, "--name", "Hexnut"], "no polygon named 'Hexnut'; it has hex_nut, "),
@@ -1011,7 +1081,8 @@ def test_module_runs(tmp_path: Path) -> None:
     assert (done.returncode, done.stderr) == (0, "")
     assert "goal reached" in done.stdout
     done = in_process_of_its_own(*RECTANGLE, *TWO_GRASPS, "--fingers", "3", cwd=tmp_path)
-    assert (done.returncode, done.stdout) == (1, "")
+    assert done.returncode == 1
+    assert done.stdout.startswith("No plan: ")
     assert_one_line(done.stderr)
 
 

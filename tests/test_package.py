@@ -20,23 +20,38 @@ TEXT = """
 check_certificates
 errors
 contact  rings  ring_checks  polygon  wkt  files
-friction  wrenches  force_closure  random_grasps
+directions  friction  wrenches  force_closure  random_grasps
 circuits  torque  margins
 linear_sets
-lp.solver  lp.ladder  lp.margin_lp  lp.highs_solver  lp.clarabel_solver  lp.exact_solver  lp
+lp.solver  lp.ladder  lp.margin_lp  lp.highs_solver  lp.clarabel_solver  lp.exact_solver
+lp.linear_program  lp.prices  lp
 exact_margins  completion  polytopes
-grasp_sets  grasp_sets.candidates  grasp_sets.families  grasp_sets.pieces  grasp_sets.vertices
+grasp_sets  grasp_sets.candidates  grasp_sets.families  grasp_sets.pieces  grasp_sets.spacing
+grasp_sets.set_pieces  grasp_sets.vertices  grasp_sets.spaced
 grasp_sets.sweeps  grasp_sets.focus  grasp_sets.double_cones  grasp_sets.parallel
-grasp_sets.collection
-quality
-planning  planning.hand  planning.steps
-shadows  switching  joins  contact_rule  handovers  focus_rule  switches
-planning.plan_document  planning.verification  planning.plan  planning.plan_file  planning.account
-planning.search  planning.aligning  planning.path_lp  planning.regrip  planning.hops
-planning.execution
-planning.planner  planning.on_demand
-summary  tables  structure  switching_graph  existence  certification  certificates
-build  graph_file
+grasp_sets.grasp_set  grasp_sets.collection
+quality  remedies
+planning  planning.hand  planning.reach  planning.steps  planning.objective
+shadows  switching  joins  contact_rule  couplings  handovers  focus_rule  switches
+planning.plan_document  planning.limit_checks  planning.verification  planning.along
+planning.plan  planning.plan_file
+planning.regions  planning.limits  planning.plan_program  planning.friction_change
+planning.sensitivity  planning.account
+planning.branches  planning.search  planning.steering
+planning.aligning  planning.path_lp
+planning.path_optimum  planning.regrip  planning.hops
+planning.execution  planning.performance
+planning.shortest_slide  planning.set_rows  planning.route_lp  planning.costs
+planning.route_search  planning.shortest
+planning.levels  planning.moves  planning.ends  planning.bottleneck  planning.widest
+planning.alternatives  planning.widest_routes
+planning.requests  planning.planner  planning.on_demand  planning.growing  planning.nearby
+planning.hit_and_run  planning.layers  planning.path_choices  planning.path_steps
+planning.path_model
+planning.path_set  planning.path_sets
+summary  tables  structure  graph_options  refusals  queries  switching_graph  networks  existence
+certification  certificates
+build  graph_file  nearest_switch  connection  explanation  why_not
 workers  many
 membership  sampling  completeness
 plotting.palette  plotting.placement  plotting.frame  plotting.outline  plotting.grasps
@@ -45,7 +60,9 @@ plotting.friction_cones
 plotting.regions  plotting.contact_space  plotting.normals  plotting.graph
 plotting.filmstrip  plotting
 __init__
-cli.progress  cli.values  cli.far_apart  cli.tables  cli.arguments  cli.commands  cli
+cli.progress  cli.values  cli.hand_options  cli.far_apart  cli.alternatives
+cli.tables  cli.arguments  cli.commands
+cli
 __main__
 """
 ORDER = TEXT.split()
@@ -118,11 +135,13 @@ def test_imports_point_upwards(name: str) -> None:
 
 
 def test_the_exact_checks_share_nothing_with_the_planner() -> None:
-    geometry = {"errors", "contact", "rings", "ring_checks", "polygon", "friction", "wrenches"}
+    geometry = {"errors", "contact", "rings", "ring_checks", "polygon", "directions", "friction"}
+    geometry |= {"wrenches"}
     assert reached("force_closure") <= geometry
     assert reached("planning.verification") <= geometry | {
         "force_closure",
         "planning.plan_document",
+        "planning.limit_checks",
     }
 
 

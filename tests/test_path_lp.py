@@ -13,7 +13,7 @@ from regrasps import nut, random_grasps, tee
 from scipy.optimize import linprog
 
 import regrasp_lp as rl
-from regrasp_lp.planning import path_lp, planner
+from regrasp_lp.planning import path_lp, path_optimum, planner
 from regrasp_lp.planning.path_lp import PathProblem, Stage
 
 
@@ -40,7 +40,7 @@ def plan_with_chain(
         return seen["problem"]
 
     def solve(problem: PathProblem, solver: str) -> Any:
-        seen["grasps"] = path_lp.solve_path_problem(problem, solver)
+        seen["grasps"] = path_optimum.solve_path_problem(problem, solver)
         return seen["grasps"]
 
     with monkeypatch.context() as patch:
@@ -258,60 +258,3 @@ def test_travel_is_least_among_the_best(monkeypatch: pytest.MonkeyPatch) -> None
         )
         length = np.abs(problem.moves @ x + problem.offsets).sum()
         assert length <= result.fun + 1e-4
-
-
-class Panic(BaseException):
-    """As a panic of a solver written in Rust."""
-
-
-def test_solvers_that_both_fail_are_said(monkeypatch: pytest.MonkeyPatch) -> None:
-    import cvxpy as cp
-
-    graph = rl.build_switching_graph(rectangle(), 0.4)
-    ends = [(0, 2.0), (2, 2.0)], [(1, 1.0), (3, 1.0)]
-    with monkeypatch.context() as patch:
-        patch.setattr(cp.Problem, "status", "user_limit")
-        both = "clarabel stopped with status 'user_limit'; highs stopped with status 'user_limit'"
-        with pytest.raises(rl.SolverError, match=f"neither yes nor no: {both}"):
-            graph.plan(*ends)
-
-    def fail(*_: object, **__: object) -> None:
-        raise cp.SolverError("no licence")
-
-    monkeypatch.setattr(cp.Problem, "solve", fail)
-    with pytest.raises(rl.SolverError, match="clarabel raised SolverError: no licence; highs"):
-        graph.plan(*ends)
-
-
-@pytest.mark.parametrize("error", [ValueError("no"), Panic("index out of bounds"), MemoryError()])
-def test_where_one_solver_fails_the_other_one_plans(
-    error: BaseException, monkeypatch: pytest.MonkeyPatch, caplog: pytest.LogCaptureFixture
-) -> None:
-    import cvxpy as cp
-
-    graph = rl.build_switching_graph(rectangle(), 0.4)
-    ends = [(0, 2.0), (2, 2.0)], [(1, 1.0), (3, 1.0)]
-    sound, original = graph.plan(*ends), cp.Problem.solve
-
-    def solve(self: cp.Problem, solver: str, **options: object) -> object:
-        if solver == cp.CLARABEL:
-            raise error
-        return original(self, solver=solver, **options)
-
-    monkeypatch.setattr(cp.Problem, "solve", solve)
-    plan = graph.plan(*ends)
-    assert plan.verify().ok
-    assert plan.tolerance == pytest.approx(sound.tolerance, abs=1e-6)
-    assert f"path LP solved by highs: clarabel raised {type(error).__name__}" in caplog.text
-
-
-def test_an_interrupt_is_no_failure_of_a_solver(monkeypatch: pytest.MonkeyPatch) -> None:
-    import cvxpy as cp
-
-    def interrupt(*_: object, **__: object) -> None:
-        raise KeyboardInterrupt
-
-    graph = rl.build_switching_graph(rectangle(), 0.4)
-    monkeypatch.setattr(cp.Problem, "solve", interrupt)
-    with pytest.raises(KeyboardInterrupt):
-        graph.plan([(0, 2.0), (2, 2.0)], [(1, 1.0), (3, 1.0)])

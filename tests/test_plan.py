@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import os
+from dataclasses import replace
 from functools import cache
 from itertools import pairwise
 from pathlib import Path
@@ -16,7 +17,8 @@ from regrasps import nut, plate, random_grasps
 import regrasp_lp as rl
 from regrasp_lp.friction import Cones
 from regrasp_lp.planning.account import describe
-from regrasp_lp.planning.plan import least_margin_along
+from regrasp_lp.planning.along import least_margin_along
+from regrasp_lp.planning.objective import Objective, ObjectiveLike
 from regrasp_lp.torque import torque_functions
 
 
@@ -290,7 +292,7 @@ def test_a_failed_write_leaves_the_old_plan(
 def test_account_tells_every_step() -> None:
     for plan in plans():
         text = str(plan)
-        column = " ".join(line[5:46].strip() for line in text.splitlines()[3:])
+        column = " ".join(line[5:38].strip() for line in text.splitlines()[3:])
         rest = column
         for step in plan.steps:
             assert describe(step) in rest
@@ -301,6 +303,36 @@ def test_account_tells_every_step() -> None:
         assert text.splitlines()[-1].startswith("goal reached: edge ")
         assert max(map(len, text.splitlines()[3:-1])) <= 80
         assert repr(plan).startswith(f"<Plan {plan.polygon.name!r}: {len(plan.steps)} steps")
+
+
+def test_account_says_how_good_the_plan_is() -> None:
+    def line(objective: ObjectiveLike, bound: float | None) -> str:
+        aim = Objective.of(objective)
+        told = str(replace(plan, objective=aim, bound=bound)).splitlines()
+        assert max(map(len, told)) < 80
+        found = [i for i, text in enumerate(told) if text.startswith("objective")]
+        return " ".join(told[i] for i in range(found[0], told.index(""))) if found else ""
+
+    plan = next(plan for plan in plans() if np.isfinite(plan.chosen_margin) and plan.travel)
+    margin, travel, count = plan.chosen_margin, plan.travel, plan.placements
+    assert not line("margin", None)
+    best = f"objective margin: {margin:.4g}, bound {margin:.4g}: no plan is better"
+    assert line("margin", margin) == best
+    assert line("margin", 2 * margin) == (
+        f"objective margin: {margin:.4g}, bound {2 * margin:.4g}: no plan is better by more than "
+        f"{margin:.4g}"
+    )
+    assert line("placements", count).endswith(f": {count}, bound {count}: no plan is better")
+    assert replace(plan, objective=Objective.of("travel"), bound=-np.inf).gap == np.inf
+    assert line("travel", -np.inf).endswith(": how good plans can be is not known")
+    weights = {"margin": 0.5, "travel": 1, "tolerance": 2}
+    cost = travel - 0.5 * margin - 2 * plan.chosen_tolerance
+    assert line(weights, cost).startswith(
+        f"objective -0.5 margin - 2 tolerance + 1 travel: {cost:.4g}, bound {cost:.4g}: no "
+    )
+    still = next(p for p in plans() if not np.isfinite(p.chosen_margin))
+    told = str(replace(still, objective=Objective.of("margin"), bound=np.inf))
+    assert "\nobjective margin: there was nothing to choose: no plan is better\n" in told
 
 
 def test_describe() -> None:

@@ -464,7 +464,7 @@ class TestPlan:
             "two-finger grasp",
         ]
         alone = make_plan(PLATE, {1: at(0, 0.5), 2: at(2, 0.5)}, [], TWO)
-        assert key(alone) == ["supports the object", "two-finger grasp"]
+        assert key(alone) == ["supports the object", "two-finger grasp", "where it may be"]
 
     def test_parallel_support_has_common_cones(self):
         trapezium = Polygon([(0, 0), (60, 0), (58, 30), (2, 28)])

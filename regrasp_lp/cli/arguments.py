@@ -10,6 +10,7 @@ from typing import Any, NoReturn
 
 import regrasp_lp
 from regrasp_lp.cli import values
+from regrasp_lp.cli.hand_options import add_hand
 from regrasp_lp.errors import OptionError
 
 PROGRAM = "regrasp-lp"
@@ -36,8 +37,10 @@ exit codes:
   2  an error: one line on standard error says what is wrong"""
 
 _PLAN = """\
-Find a plan with the fewest placements of fingers that leads from one grasp to
-another without ever letting go of the object, and print an account of it.
+Find a plan that leads from one grasp to another without ever letting go of the
+object, with the fewest placements of fingers or the best in what --objective
+asks for, and print an account of it: how good it is, and whether any plan can
+be better.
 
 Give start and goal as contacts (--start 4:0.3,0:1.2) or as points on the
 boundary (--start-xy "0.5,0 2,1.5"). What is not given is chosen far from the
@@ -49,7 +52,7 @@ examples:
   regrasp-lp plan parts.geojson --name rectangle --friction 0.4 \\
       --start 0:30,2:30 --goal-xy "60,10 0,10" --json plan.json --plot plan.pdf
   regrasp-lp plan parts.geojson --name wedge --friction 0.5,0.5,0.7 \\
-      --start 0:10,1:15,2:30 --goal 0:20,1:10,2:25
+      --start 0:10,1:15,2:30 --goal 0:20,1:10,2:25 --objective margin
 
 exit codes:
   0  a plan was found; it has passed an exact check
@@ -211,14 +214,35 @@ def _add_plan(parser: argparse.ArgumentParser) -> None:
     _add_grasps(parser)
     _add_model(parser)
     parser.add_argument(
+        "--objective",
+        type=values.objective,
+        default="placements",
+        metavar="WHAT",
+        help="what the plan is best in: placements (default), margin, tolerance or travel; or "
+        "weights of these, as in placements=1,travel=0.2",
+    )
+    parser.add_argument(
         "--aligning",
         choices=("slide", "regrip"),
         default="slide",
         help="how fingers move inside a grasp set: sliding along the edges (default), or by free "
         "fingers taking over",
     )
+    parser.add_argument(
+        "--alternatives",
+        type=values.plans,
+        default=1,
+        metavar="K",
+        help="up to K different plans: the best one in full, then a table of all (default: 1)",
+    )
+    parser.add_argument(
+        "--sensitivity",
+        action="store_true",
+        help="also print what limits the plan and at which price, what friction does to it, and "
+        "how far each finger may be off at each step",
+    )
     files = parser.add_argument_group("files to write")
-    _add_output(files, "--json", values.output_file, "the plan, for `check` and other programs")
+    _add_output(files, "--json", values.output_file, "the plan, for `check`; others as OUT-2, ...")
     _add_output(files, "--plot", values.picture_file, "a filmstrip of it: .png, .svg or .pdf")
 
 
@@ -341,13 +365,7 @@ def _add_model(parser: argparse.ArgumentParser) -> Any:
         metavar="MU",
         help="coefficient of friction: one value, or one for each edge separated by commas",
     )
-    group.add_argument(
-        "--fingers",
-        type=values.fingers,
-        default=4,
-        metavar="K",
-        help="fingers of the hand, 3 or more (default: 4)",
-    )
+    add_hand(group)
     _add_sets(group, "complete")
     group.add_argument(
         "--solver",

@@ -17,8 +17,10 @@ from regrasp_lp import Grasp, Hand, Plan, Polygon, SwitchingGraph
 from regrasp_lp.certification import check_provable
 from regrasp_lp.check_certificates import is_certificates
 from regrasp_lp.check_certificates import main as check_certificates
+from regrasp_lp.cli.alternatives import alternatives_text
 from regrasp_lp.cli.arguments import PROGRAM
 from regrasp_lp.cli.far_apart import far_apart
+from regrasp_lp.cli.hand_options import hand_of
 from regrasp_lp.cli.progress import ProgressBar, complain
 from regrasp_lp.cli.tables import attempt, polygon_files, summaries_of
 from regrasp_lp.cli.values import PICTURES, grasp_text
@@ -32,7 +34,7 @@ from regrasp_lp.errors import (
 )
 from regrasp_lp.files import write_atomically
 from regrasp_lp.friction import FloatArray, per_edge_friction
-from regrasp_lp.planning.planner import checked_grasp
+from regrasp_lp.planning.requests import checked_grasp
 from regrasp_lp.switches import SwitchesOnDemand
 from regrasp_lp.tables import csv_table, markdown_table, text_table
 
@@ -50,49 +52,71 @@ def plan(options: Namespace) -> int:
     _check_outputs(options.file, options.json, options.plot)
     polygon = _one_polygon(options.file, options.name)
     friction = _friction(polygon, options.friction)
-    hand = Hand(options.fingers)
+    hand = hand_of(options)
     given: dict[str, Grasp | None] = {}
     for role in _ROLES:
         asked = _asked_grasp(polygon, role, options)
         if asked is not None:
             asked = checked_grasp(polygon, asked, friction, hand, role)
         given[role] = asked
-    found = _found_plan(polygon, friction, hand, given, options)
+    try:
+        found, *others = _found_plans(polygon, friction, hand, given, options)
+    except NoPlanFound as answer:
+        _print_explanation(answer)
+        raise
     print(found)
     print("It has passed an exact check.", flush=True)
+    if options.alternatives > 1:
+        print(f"\n{alternatives_text([found, *others], options.alternatives)}", flush=True)
+    if options.sensitivity:
+        print(f"\n{found.sensitivity()}", flush=True)
     if options.json:
-        with _writing(options.json):
-            found.to_json(options.json)
+        for number, one in enumerate([found, *others], 1):
+            stem = options.json.stem if number == 1 else f"{options.json.stem}-{number}"
+            with _writing(options.json.with_stem(stem)) as path:
+                one.to_json(path)
     if options.plot:
         _save_picture(found.plot, options.plot)
     return 0
 
 
-def _found_plan(
+def _print_explanation(answer: NoPlanFound) -> None:
+    """Say in full why there is no plan, if start and goal are known."""
+    if answer.question is None:
+        return
+    with ProgressBar() as bar:
+        bar("looking for what would help", 0, 0)
+        explanation = answer.explain(bar)
+    print(explanation, flush=True)
+
+
+def _found_plans(
     polygon: Polygon,
     friction: FloatArray,
     hand: Hand,
     given: dict[str, Grasp | None],
     options: Namespace,
-) -> Plan:
+) -> list[Plan]:
     start, goal = given["start"], given["goal"]
+    how = options.aligning, options.objective
     built = None
-    if start is None or goal is None or options.solver != "clarabel":
+    several = options.alternatives > 1
+    if start is None or goal is None or options.solver != "clarabel" or several:
         with ProgressBar() as bar:
             built = _built(polygon, friction, hand, options, bar)
             bar("choosing grasps", 0, 0)
             start, goal = _complete(built, given)
         if None in given.values():
             print(_choice_text(given, {"start": start, "goal": goal}), end="\n\n", flush=True)
-        if options.solver == "clarabel" and isinstance(built.switches, SwitchesOnDemand):
+        on_demand = isinstance(built.switches, SwitchesOnDemand)
+        if options.solver == "clarabel" and on_demand and not several:
             built = None  # faster without it
     with ProgressBar() as bar:
         bar("planning", 0, 0)
         if built is not None:
-            return built.plan(start, goal, aligning=options.aligning)
-        return regrasp_lp.plan_regrasp(
-            polygon, start, goal, friction, hand, sets=options.sets, aligning=options.aligning
-        )
+            return built.plans(start, goal, options.alternatives, *how)
+        plan = regrasp_lp.plan_regrasp(polygon, start, goal, friction, hand, options.sets, *how)
+        return [plan]
 
 
 def _built(
@@ -115,7 +139,7 @@ def graph(options: Namespace) -> int:
     _check_outputs(options.file, options.save, options.certificates)
     polygons = _polygons(options.file, options.name)
     if options.certificates:
-        check_provable(options.switching, options.min_margin)
+        check_provable(options.switching, options.min_margin, hand_of(options))
     for option in ("save", "certificates"):
         if getattr(options, option) and len(polygons) > 1:
             several = _several(options.file, polygons)
@@ -123,7 +147,7 @@ def graph(options: Namespace) -> int:
     for number, polygon in enumerate(polygons):
         friction = _friction(polygon, options.friction)
         with ProgressBar() as bar:
-            built = _built(polygon, friction, Hand(options.fingers), options, bar)
+            built = _built(polygon, friction, hand_of(options), options, bar)
             bar("counting", 0, 0)
             summary = built.summary()
         if number:
@@ -344,10 +368,10 @@ def _check_outputs(source: str | Path, *outputs: Path | None) -> None:
 
 
 @contextlib.contextmanager
-def _writing(path: Path) -> Iterator[None]:
+def _writing(path: Path) -> Iterator[Path]:
     """Say which file could not be written, or that it was."""
     try:
-        yield
+        yield path
     except OSError as error:
         raise OptionError(f"{path}: cannot be written: {error.strerror or error}") from error
     print(f"wrote {path}", flush=True)

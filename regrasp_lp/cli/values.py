@@ -8,6 +8,8 @@ import re
 from pathlib import Path
 
 from regrasp_lp.contact import Contact, Grasp
+from regrasp_lp.errors import OptionError
+from regrasp_lp.planning.objective import Objective
 
 PICTURES = (".png", ".svg", ".pdf")
 
@@ -102,12 +104,63 @@ def edges(text: str) -> int:
     return number
 
 
+def edge_numbers(text: str) -> list[int]:
+    """Read numbers of edges, separated by commas.
+
+    Examples
+    --------
+    >>> edge_numbers("3, 4")
+    [3, 4]
+    """
+    numbers = [_whole(part) for part in text.split(",")]
+    if None in numbers:
+        raise argparse.ArgumentTypeError(
+            f"{text!r} does not name edges; write their numbers separated by commas, as in 3,4"
+        )
+    return [number for number in numbers if number is not None]
+
+
 def jobs(text: str) -> int:
     """Read a number of processes, 1 or more."""
     number = _whole(text)
     if number is None or number < 1:
         raise argparse.ArgumentTypeError(f"{text!r} is no number of processes; write 1 or more")
     return number
+
+
+def plans(text: str) -> int:
+    """Read a number of plans, 1 or more."""
+    number = _whole(text)
+    if number is None or number < 1:
+        raise argparse.ArgumentTypeError(f"{text!r} is no number of plans; write 1 or more")
+    return number
+
+
+def objective(text: str) -> Objective:
+    """Read the name of an objective, or weights by name.
+
+    Examples
+    --------
+    >>> objective("margin").name
+    'margin'
+    >>> objective("placements=1, travel=0.2").weights
+    (('placements', 1.0), ('travel', 0.2))
+    """
+    try:
+        if "=" not in text:
+            return Objective.of(text.strip())
+        weights: dict[str, float] = {}
+        for part in text.split(","):
+            name, equals, weight = (piece.strip() for piece in part.partition("="))
+            value = _number(weight)
+            if not equals or value is None or name in weights:
+                raise argparse.ArgumentTypeError(
+                    f"{part.strip()!r} is no weight; write each once, as in placements=1,travel=0.2"
+                )
+            weights[name] = value
+        return Objective.of(weights)
+    except OptionError as error:
+        raise argparse.ArgumentTypeError(str(error)) from error
 
 
 def length(text: str) -> float:

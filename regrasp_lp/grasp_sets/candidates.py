@@ -39,8 +39,8 @@ def complete_candidates(cones: Cones, m: int) -> IntArray:
     if m == 2:
         pairs = np.stack((first, second), axis=1)
         return pairs[spanning(cones, pairs)]
-    kept = []
-    step = max(1, _CHUNK // n)
+    kept: list[IntArray] = [np.zeros((0, m), dtype=np.intp)]
+    step = max(1, _CHUNK // max(n, 1))
     for start in range(0, len(first), step):
         a, b = first[start : start + step], second[start : start + step]
         counts = n - b
@@ -64,7 +64,7 @@ def two_finger_candidates(cones: Cones) -> IntArray:
         Edges ascend within a row and rows ascend.
     """
     circle = _NormalCircle(cones)
-    width = circle.theta + circle.theta.max()
+    width = circle.theta + circle.widest
     first, second = circle.windows(np.arange(cones.n_edges), np.pi - width, np.pi + width)
     pairs = np.stack((first, second), axis=1)[first < second]
     return _sorted_rows(pairs[spanning(cones, pairs)])
@@ -86,7 +86,7 @@ def concurrent_candidates(cones: Cones) -> IntArray:
         Edges ascend within a row and rows ascend.
     """
     circle = _NormalCircle(cones)
-    least = circle.theta.min()
+    least = circle.theta.min(initial=np.pi / 2)
     widest = np.pi - circle.theta - least
     i, j = circle.windows(np.arange(cones.n_edges), circle.theta + least, widest)
     i, j = i[i < j], j[i < j]
@@ -121,12 +121,14 @@ def parallel_candidates(cones: Cones) -> tuple[IntArray, IntArray]:
         The centre edge a. For μ > 1 a triple can have several.
     """
     circle = _NormalCircle(cones)
-    width = circle.theta + circle.theta.max()
+    width = circle.theta + circle.widest
     b, c = circle.windows(np.arange(cones.n_edges), -width, width)
     b, c = b[b < c], c[b < c]
     pair, a = circle.windows(b, np.pi - width[b], np.pi + width[b])
     triples = np.stack((a, b[pair], c[pair]), axis=1)
-    triples = triples[(a != b[pair]) & (a != c[pair])]
+    # of segments, too, all three have to be on different edges
+    edge = cones.edge[triples]
+    triples = triples[(edge != edge[:, [1, 2, 0]]).all(axis=1)]
     triples = triples[common_cone(cones, triples).exists]
     rows = _sorted_rows(np.column_stack((np.sort(triples, axis=1), triples[:, 0])))
     return rows[:, :3], rows[:, 3]
@@ -196,6 +198,7 @@ class _NormalCircle:
         x, y = cones.vectors.T
         self.angle: FloatArray = np.mod(np.arctan2(x, -y), 2 * np.pi)
         self.theta: FloatArray = np.arctan(cones.friction)
+        self.widest = self.theta.max(initial=0.0)
         self._order = np.argsort(self.angle, kind="stable")
         once = self.angle[self._order]
         self._around = np.concatenate((once - 2 * np.pi, once, once + 2 * np.pi))

@@ -2,201 +2,25 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from itertools import combinations
 from typing import overload
 
 import numpy as np
-from numpy.typing import ArrayLike
 
 from regrasp_lp.contact import Contact, Grasp
-from regrasp_lp.errors import OptionError
-from regrasp_lp.friction import FloatArray, IntArray
-from regrasp_lp.grasp_sets.double_cones import double_cones
-from regrasp_lp.grasp_sets.focus import focus_cell, independent_regions
-from regrasp_lp.grasp_sets.parallel import common_cone_rays, outer_regions, subpolytopes
-from regrasp_lp.grasp_sets.pieces import in_positions, order_rows, piece_sets
+from regrasp_lp.friction import Cones, FloatArray, IntArray
+from regrasp_lp.grasp_sets.grasp_set import GraspSet as GraspSet
+from regrasp_lp.grasp_sets.grasp_set import slot_order
+from regrasp_lp.grasp_sets.set_pieces import SetPieces
+from regrasp_lp.grasp_sets.spacing import Alternatives, Spacing
 from regrasp_lp.grasp_sets.vertices import Family
-from regrasp_lp.linear_sets import LinearSets
-from regrasp_lp.margins import existing_pieces
 from regrasp_lp.polygon import Polygon
 from regrasp_lp.torque import TorqueFunctions
 
-
-@dataclass(frozen=True, eq=False)
-class GraspSet:
-    """All force-closure grasps of one kind on one combination of edges.
-
-    A vertex of the switching graph: connected, and the union of the convex `pieces`.
-
-    Parameters
-    ----------
-    polygon : Polygon
-    kind : str
-        "two_finger" or "three_finger" of complete sets; "two_finger", "concurrent" or "parallel"
-        of the chapter's.
-    edges : tuple of int
-        Ascending; an edge may occur twice.
-    center : int or None
-        Centre edge of a parallel set.
-    margin : float
-        The largest margin of a grasp in it, in the object's unit.
-    witness : Grasp
-        A grasp strictly inside that attains it (of a set within rounding: the nearest doubles).
-    torque : TorqueFunctions
-        Its torque functions, a stack of one.
-    """
-
-    polygon: Polygon
-    kind: str
-    edges: tuple[int, ...]
-    center: int | None
-    margin: float
-    witness: Grasp
-    torque: TorqueFunctions
-
-    @property
-    def names(self) -> tuple[str, ...]:
-        """Names of the contact positions: "u4" on edge 4, "u4'" for a second one there."""
-        names = [f"u{edge}" for edge in self.edges]
-        return tuple(f"{n}'" if n in names[:i] else n for i, n in enumerate(names))
-
-    @cached_property
-    def pieces(self) -> LinearSets:
-        """The convex pieces ``{M_j < 0 < M_k}``, best first, over positions along the edges.
-
-        Coordinates are named by `names`, rows have the unit of length, and a row's margin is that
-        of the torque function. Two contacts on one edge are in order (a row of scale 0).
-        """
-        pieces = existing_pieces(self.torque)
-        sets = piece_sets(self.torque, pieces, self.names)
-        sets = in_positions(sets, self.torque.lengths[0])
-        return _in_order(sets, self.edges)
-
-    @cached_property
-    def focus_cell(self) -> LinearSets | None:
-        """The pieces of the focus cell, over "x" and "y", widest first.
-
-        Of a concurrent or a two-finger set (chapter, sections 3.3.1.1 and 3.3.1.2); None of others.
-        The margin of a point is its distance to the boundary of the piece.
-        """
-        if self.kind not in ("concurrent", "two_finger"):
-            return None
-        return focus_cell(self.torque.cones, np.array(self.edges))
-
-    @cached_property
-    def double_cones(self) -> LinearSets | None:
-        """The pieces by sides over the contact positions and the focus point, widest first.
-
-        Of a concurrent set: ``s_i (q - p_i)`` in the cone of each contact, over `names`, "x" and
-        "y" (chapter, Propositions 3.4 and 3.6); None of others.
-        """
-        if self.kind != "concurrent":
-            return None
-        sets = double_cones(self.torque.cones, np.array(self.edges), self.names)
-        return in_positions(sets, [*self.torque.lengths[0], 1.0, 1.0])
-
-    @cached_property
-    def common_cone(self) -> FloatArray | None:
-        """The boundaries of the common cone of a parallel set, clockwise first, shape (2, 2).
-
-        Unit vectors, as at the contacts that are not on the centre edge; None of other sets.
-        """
-        if self.center is None:
-            return None
-        return common_cone_rays(self.torque.cones, self.center, self._others)
-
-    @cached_property
-    def subpolytopes(self) -> LinearSets | None:
-        """The chapter's six sub-polytopes K0 to K5 of a parallel set; None of other sets.
-
-        Over `names`, closed; their margins fall to 0 at walls inside the set (see `pieces`).
-        """
-        if self.center is None:
-            return None
-        return in_positions(subpolytopes(self.torque, self.names), self.torque.lengths[0])
-
-    def outer_regions(self, position: float | None = None) -> LinearSets:
-        """Return the left and the right outer region of a parallel set, over "x" and "y".
-
-        Parameters
-        ----------
-        position : float, optional
-            Of a contact on the centre edge, at which the common cone is drawn; by default cones
-            are drawn at all of the edge (the chapter's union volume).
-
-        Raises
-        ------
-        OptionError
-            If this is no parallel set, or the position is not on its centre edge.
-        """
-        if self.center is None:
-            raise OptionError(f"outer regions are those of a parallel set; this one is {self.kind}")
-        length = float(self.torque.cones.lengths[self.center])
-        number = position is None or isinstance(position, (int, float, np.number))
-        if not number or (position is not None and not 0 <= position <= length):
-            raise OptionError(
-                f"position {position!r} is not on the centre edge {self.center}, from 0 to "
-                f"{length:g}"
-            )
-        span = (0.0, 1.0) if position is None else (position / length, position / length)
-        return outer_regions(self.torque.cones, self.center, self._others, np.array(span))
-
-    def independent_regions(self, point: ArrayLike) -> FloatArray:
-        """Return the independent contact regions at a point of the focus cell.
-
-        Contacts may be anywhere inside them, each on its own.
-
-        Parameters
-        ----------
-        point : array_like, shape (2,)
-
-        Returns
-        -------
-        numpy.ndarray, shape (m, 2)
-            First and last position on each edge, in the order of `edges`.
-
-        Raises
-        ------
-        OptionError
-            If the set has no focus cell, or the point is not inside it.
-        """
-        if self.focus_cell is None:
-            raise OptionError(
-                f"a {self.kind} set has no focus cell: a concurrent or two-finger does"
-            )
-        try:
-            q = np.array(point, dtype=np.float64)
-        except (TypeError, ValueError):
-            q = np.zeros(0)
-        if q.shape != (2,) or not np.isfinite(q).all():
-            raise OptionError(f"a focus point is a pair of coordinates, got {point!r}")
-        return independent_regions(self.torque.cones, np.array(self.edges), self.focus_cell, q)
-
-    @property
-    def _others(self) -> list[int]:
-        return [edge for edge in self.edges if edge != self.center]
-
-    def __contains__(self, grasp: object) -> bool:
-        """Whether a grasp on exactly these edges is strictly inside, decided exactly."""
-        if not isinstance(grasp, Grasp):
-            return False
-        resolved = self.polygon.resolve(grasp)
-        order = slot_order(resolved)
-        if tuple(resolved.edges[order].tolist()) != self.edges:
-            return False
-        return bool(self.torque.contain(resolved.fractions[order][None, :])[0])
-
-    def __repr__(self) -> str:
-        center = "" if self.center is None else f", centre {self.center}"
-        return f"<GraspSet {self.kind} on edges {self.edges}{center}, margin {self.margin:.4g}>"
-
-
-def slot_order(grasp: Grasp) -> IntArray:
-    """Return the order of a grasp's contacts by edge and then along it, as sets have them."""
-    return np.lexsort((grasp.fractions, grasp.edges))
+_EQUAL = 1e-12  # of an edge: contacts that are the same but for rounding
 
 
 @dataclass(frozen=True, eq=False)
@@ -208,10 +32,13 @@ class GraspSets(Sequence[GraspSet]):
     polygon : Polygon
     families : tuple of Family
         Stacked sets of one kind each.
+    spacing : Spacing, optional
+        Limits to the distance between fingers, if there are any.
     """
 
     polygon: Polygon
     families: tuple[Family, ...]
+    spacing: Spacing | None = None
 
     @cached_property
     def offsets(self) -> IntArray:
@@ -252,33 +79,114 @@ class GraspSets(Sequence[GraspSet]):
         return family, int(index - self.offsets[family])
 
     def functions(self, index: int) -> TorqueFunctions:
-        """Return the torque functions of one set, as a stack of one."""
+        """Return the torque functions of one set, as a stack of one.
+
+        Over the segments of edges that can be touched: `fractions` and `grasp` lead there and back.
+        """
         family, row = self.place(index)
         return self.families[family].functions.take(np.array([row]))
+
+    def pieces(self, index: int) -> SetPieces:
+        """Return the convex pieces of one set, best first, over the fractions of `functions`."""
+        family, row = self.place(index)
+        return self.families[family].pieces_of(row)
+
+    def coupled(
+        self, first: int, second: int, slots: Sequence[tuple[int, int]]
+    ) -> Alternatives | None:
+        """Return what limits the distances between the fingers of two grasps that touch at once.
+
+        Parameters
+        ----------
+        first, second : int
+            Numbers of two sets.
+        slots : sequence of (int, int)
+            The contacts that both grasps have, as places in the first and in the second set.
+
+        Returns
+        -------
+        Alternatives or None
+            Convex sets of which one has to hold, over the fractions of the contacts of the first
+            set and then of those of the second that are not held; None without such limits.
+        """
+        if self.spacing is None:
+            return None
+        one, other = (self.functions(i).edges[0] for i in (first, second))
+        mine = [i for i in range(len(one)) if i not in [here for here, _ in slots]]
+        theirs = [i for i in range(len(other)) if i not in [there for _, there in slots]]
+        pairs = [(i, len(one) + n) for i in mine for n in range(len(theirs))]
+        return self.spacing.alternatives(np.concatenate((one, other[theirs])), pairs)
 
     def witness(self, index: int) -> Grasp:
         """Return a best grasp of a set."""
         family, row = self.place(index)
         return self.grasp(index, self.families[family].witnesses[row])
 
-    def grasp(self, index: int, fractions: FloatArray) -> Grasp:
-        """Return the grasp of a set at given fractions of its edges."""
+    @property
+    def cones(self) -> Cones:
+        """The friction cones of all that can be touched: edges, or segments of them."""
+        return self.families[0].functions.cones
+
+    def grasp(self, index: int, fractions: FloatArray, near: Iterable[Contact] = ()) -> Grasp:
+        """Return the grasp of a set at given fractions of its edges, or of segments of them.
+
+        Parameters
+        ----------
+        index : int
+        fractions : numpy.ndarray, shape (m,) or longer
+            As the set's functions take them.
+        near : iterable of Contact, optional
+            Given contacts (resolved), to be hit exactly: a contact that is one of them but for
+            the rounding between fractions of segments and of edges is that one.
+
+        Returns
+        -------
+        Grasp
+            Resolved; no contact is beyond the end of its segment.
+        """
         family, row = self.place(index)
-        edges = self.families[family].functions.edges[row]
-        pairs = zip(edges.tolist(), fractions[: len(edges)].tolist(), strict=True)
+        segments = self.families[family].functions.edges[row]
+        found = self.cones.along(segments, fractions[: len(segments)]).tolist()
+        edges = self.cones.edge[segments].tolist()
+        if self.cones.whole is not self.cones:
+            given = [(contact.edge, contact.fraction) for contact in near]
+            for n, (edge, f) in enumerate(zip(edges, found, strict=True)):
+                there = [g for e, g in given if e == edge and g is not None]
+                apart, nearest = min(((abs(g - f), g) for g in there), default=(0.0, f))
+                found[n] = nearest if apart < _EQUAL else f
+        pairs = zip(edges, found, strict=True)
         return self.polygon.resolve(Grasp([Contact.at_fraction(e, f) for e, f in pairs]))
+
+    def fractions(self, index: int, fractions: FloatArray) -> FloatArray:
+        """Return fractions of whole edges as those that a set's functions take, shape (m,).
+
+        Parameters
+        ----------
+        index : int
+        fractions : numpy.ndarray, shape (m,)
+            Of a grasp in the set, contacts in its order.
+        """
+        family, row = self.place(index)
+        return self.cones.within(self.families[family].functions.edges[row], fractions)
+
+    @cached_property
+    def _by_segments(self) -> dict[tuple[int, ...], list[int]]:
+        table: dict[tuple[int, ...], list[int]] = {}
+        for family, offset in zip(self.families, self.offsets, strict=False):
+            for row, segments in enumerate(family.functions.edges.tolist()):
+                table.setdefault(tuple(segments), []).append(int(offset) + row)
+        return table
 
     @cached_property
     def _by_edges(self) -> dict[tuple[int, ...], list[int]]:
         table: dict[tuple[int, ...], list[int]] = {}
-        for family, offset in zip(self.families, self.offsets, strict=False):
-            for row, edges in enumerate(family.functions.edges.tolist()):
-                table.setdefault(tuple(edges), []).append(int(offset) + row)
+        for segments, indices in self._by_segments.items():
+            table.setdefault(tuple(self.cones.edge[list(segments)].tolist()), []).extend(indices)
         return table
 
     def on_edges(self, edges: Sequence[int]) -> list[int]:
-        """Return the numbers of all sets over a combination of edges."""
-        return list(self._by_edges.get(tuple(sorted(edges)), ()))
+        """Return the numbers of all sets over a combination of edges, ascending."""
+        return sorted(self._by_edges.get(tuple(sorted(edges)), ()))
 
     def holding(self, grasp: Grasp) -> list[tuple[int, tuple[int, ...]]]:
         """Return the sets that contain a grasp, or some of its contacts, strictly and exactly.
@@ -294,14 +202,20 @@ class GraspSets(Sequence[GraspSet]):
             A set, and which contacts of the grasp are its contacts, in its order. Ascending.
         """
         order = slot_order(grasp)
+        segments, fractions = self.cones.places(grasp.edges, grasp.fractions)
         found = []
         for count in range(2, len(grasp) + 1):
             for chosen in combinations(order.tolist(), count):
-                fractions = grasp.fractions[list(chosen)][None, :]
-                for index in self.on_edges(grasp.edges[list(chosen)].tolist()):
-                    if self.functions(index).contain(fractions)[0]:
+                key = tuple(segments[list(chosen)].tolist())
+                for index in self._by_segments.get(key, ()):
+                    if self._contain(index, fractions[list(chosen)]):
                         found.append((index, tuple(chosen)))
         return sorted(found)
+
+    def _contain(self, index: int, fractions: FloatArray) -> bool:
+        if self.spacing is not None:
+            return bool(self.pieces(index).contain(fractions).any())
+        return bool(self.functions(index).whole.contain(fractions[None, :])[0])
 
     def __len__(self) -> int:
         return int(self.offsets[-1])
@@ -323,11 +237,12 @@ class GraspSets(Sequence[GraspSet]):
         return GraspSet(
             self.polygon,
             stack.kind,
-            tuple(stack.functions.edges[row].tolist()),
-            None if center < 0 else center,
+            tuple(self.cones.edge[stack.functions.edges[row]].tolist()),
+            None if center < 0 else int(self.cones.edge[center]),
             float(stack.margins[row]),
             self.witness(index),
             self.functions(index),
+            None if self.spacing is None else self.pieces(index),
         )
 
     def __repr__(self) -> str:
@@ -336,19 +251,3 @@ class GraspSets(Sequence[GraspSet]):
 
     def __iter__(self) -> Iterator[GraspSet]:
         return (self[i] for i in range(len(self)))
-
-
-def _in_order(sets: LinearSets, edges: tuple[int, ...]) -> LinearSets:
-    """Add ``u_i - u_{i+1} <= 0`` where two contacts are on one edge."""
-    rows = order_rows(edges)
-    if not len(rows):
-        return sets
-    zeros = np.zeros((len(sets), len(rows)))
-    return LinearSets(
-        sets.names,
-        np.concatenate((sets.rows, np.tile(rows, (len(sets), 1, 1))), axis=1),
-        np.concatenate((sets.scales, zeros), axis=1),
-        np.concatenate((sets.bounds, zeros), axis=1),
-        sets.lower,
-        sets.upper,
-    )

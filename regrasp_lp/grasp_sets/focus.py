@@ -80,7 +80,7 @@ def focus_cell(cones: Cones, edges: IntArray) -> LinearSets:
 
 def in_object(cones: Cones, sets: LinearSets) -> LinearSets:
     """Return sets over "x" and "y" from the lower left corner in the object's coordinates."""
-    x, y = cones.starts.min(axis=0).tolist()
+    x, y = cones.corner.tolist()
     return sets.translate({"x": x, "y": y})
 
 

@@ -115,25 +115,31 @@ def order_rows(edges: Sequence[int]) -> FloatArray:
     return np.asarray(steps[np.equal(edges[1:], edges[:-1])])
 
 
-def in_positions(sets: LinearSets, lengths: Sequence[float]) -> LinearSets:
-    """Return linear sets over fractions as sets over positions ``u = f l``.
+def in_positions(
+    sets: LinearSets, lengths: FloatArray, starts: FloatArray | None = None
+) -> LinearSets:
+    """Return linear sets over fractions as sets over positions ``u = u_0 + f l``.
 
     Parameters
     ----------
     sets : LinearSets
-    lengths : sequence of float
-        Length of the edge of each coordinate.
+    lengths : numpy.ndarray, shape (n,)
+        Length of the edge, or segment of an edge, of each coordinate.
+    starts : numpy.ndarray, shape (n,), optional
+        The position ``u_0`` at which it starts; 0 by default.
 
     Returns
     -------
     LinearSets
     """
-    scale = np.asarray(lengths, dtype=np.float64)
-    return LinearSets(
+    scaled = LinearSets(
         sets.names,
-        sets.rows / scale,
+        sets.rows / lengths,
         sets.scales,
         sets.bounds,
-        sets.lower * scale,
-        sets.upper * scale,
+        sets.lower * lengths,
+        sets.upper * lengths,
     )
+    if starts is None or not starts.any():
+        return scaled
+    return scaled.translate(dict(zip(sets.names, starts.tolist(), strict=True)))

@@ -239,8 +239,7 @@ class Sweeps:
     @cached_property
     def _points(self) -> FloatArray:
         """Point p of each line, from the lower left corner of the object, shape (3 R, 2)."""
-        corner = self.cones.starts.min(axis=0)
-        every = np.concatenate((self.cones.starts, self.cones.ends)) - corner
+        every = np.concatenate((self.cones.local_starts, self.cones.local_ends))
         return np.asarray(every[self.point.ravel()])
 
     @cached_property

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from fractions import Fraction
 from itertools import permutations
 
@@ -21,8 +21,9 @@ from regrasp_lp.grasp_sets.candidates import (
 )
 from regrasp_lp.grasp_sets.families import parallel_functions
 from regrasp_lp.grasp_sets.pieces import piece_sets
+from regrasp_lp.grasp_sets.set_pieces import SetPieces
 from regrasp_lp.lp import GAP, MarginSolutions, Solver, maximise_margins
-from regrasp_lp.margins import best_pieces, best_points
+from regrasp_lp.margins import best_pieces, best_points, existing_pieces, piece_margins
 from regrasp_lp.torque import TorqueFunctions, torque_functions
 
 Progress = Callable[[str, int, int], None]
@@ -48,6 +49,9 @@ class Family:
         Fractions of a grasp strictly inside that attains it, to the accuracy of the solver.
     n_candidates : int
         Number of combinations that were considered.
+    pieces : SetPieces, optional
+        The convex pieces of the sets, ascending by set, if limits of the hand cut them; by default
+        all pieces of the functions.
     """
 
     kind: str
@@ -56,9 +60,24 @@ class Family:
     margins: FloatArray
     witnesses: FloatArray
     n_candidates: int
+    pieces: SetPieces | None = None
 
     def __len__(self) -> int:
         return len(self.functions)
+
+    def pieces_of(self, row: int) -> SetPieces:
+        """Return the convex pieces of one set, best first, over a stack of its functions alone."""
+        functions = self.functions.take(np.array([row]))
+        if self.pieces is None:
+            pieces = existing_pieces(functions)
+            margins = piece_margins(functions)[tuple(pieces.T)]
+            rows, bounds = np.zeros((len(pieces), 0, functions.m)), np.zeros((len(pieces), 0))
+            return SetPieces(functions, pieces, rows, bounds, margins)
+        low, high = np.searchsorted(self.pieces.pieces[:, 0], [row, row + 1])
+        mine = self.pieces.take(np.arange(low, high))
+        alone = mine.pieces.copy()
+        alone[:, 0] = 0
+        return replace(mine, functions=functions, pieces=alone)
 
 
 def candidate_functions(cones: Cones, kind: str) -> tuple[TorqueFunctions, IntArray]:

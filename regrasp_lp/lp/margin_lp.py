@@ -18,6 +18,9 @@ from regrasp_lp.lp.solver import Solver
 GAP = 1e-8
 """Largest accepted gap between the two bounds of a margin, relative to the rows' magnitude."""
 
+_ROUNDING = 1e-10
+"""Of their magnitude: by how much a point may break rows that have no margin."""
+
 _STACK = 4000
 
 _LOG = logging.getLogger("regrasp_lp")
@@ -177,6 +180,16 @@ def _merge(
     return MarginSolutions(points, margins, bounds, solution.units)
 
 
+def _rounded(sets: LinearSets) -> LinearSets:
+    """The sets with rows of scale 0 moved out by a rounding: a vertex lies on them."""
+    reach = (
+        np.abs(sets.rows).sum(axis=2)
+        * np.maximum(np.abs(sets.lower), np.abs(sets.upper)).max(axis=1, initial=0.0)[:, None]
+    )
+    rounding = _ROUNDING * np.maximum(reach, np.abs(sets.bounds))
+    return replace(sets, bounds=sets.bounds + np.where(sets.scales > 0, 0.0, rounding))
+
+
 def enclose(
     sets: LinearSets, points: FloatArray, multipliers: FloatArray, units: FloatArray
 ) -> MarginSolutions:
@@ -212,6 +225,6 @@ def enclose(
         gradient = np.einsum("br,brn->bn", y, sets.rows)
         over_box = np.maximum(-gradient * sets.lower, -gradient * sets.upper).sum(axis=1)
         bounds = (y * sets.bounds).sum(axis=1) + over_box
-        margins = np.where(failed, -np.inf, sets.margins(points))
+        margins = np.where(failed, -np.inf, _rounded(sets).margins(points))
     good = (total > 0) & ~failed & np.isfinite(bounds)
     return MarginSolutions(points, margins, np.where(good, bounds, np.inf), units)

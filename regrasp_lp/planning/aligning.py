@@ -17,11 +17,14 @@ import numpy as np
 from regrasp_lp.errors import SolverError
 from regrasp_lp.friction import FloatArray, IntArray
 from regrasp_lp.grasp_sets.pieces import BARELY_APART, piece_sets
+from regrasp_lp.grasp_sets.set_pieces import SetPieces
 from regrasp_lp.lp import Solver, maximise_margins
-from regrasp_lp.margins import existing_pieces
 from regrasp_lp.torque import TorqueFunctions
 
 _NAMES = ("f0", "f1", "f2")
+
+_ROUNDING = 1e-9
+"""Of the object's size: by how much a grasp may be beyond a limit of the hand."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -30,25 +33,30 @@ class PieceChains:
 
     Parameters
     ----------
-    functions : TorqueFunctions
-        Of one set.
+    parts : SetPieces
+        Of one set, best first.
     solver : Solver
         Maximises the margin in the overlaps.
     """
 
-    functions: TorqueFunctions
+    parts: SetPieces
     solver: Solver
 
-    @cached_property
+    @property
+    def functions(self) -> TorqueFunctions:
+        """The torque functions of the set."""
+        return self.parts.functions
+
+    @property
     def pieces(self) -> IntArray:
-        """The existing pieces as rows (0, j, k), best first, shape (P, 3)."""
-        return existing_pieces(self.functions)
+        """The pieces as rows (0, j, k), best first, shape (P, 3)."""
+        return self.parts.pieces
 
     @cached_property
     def overlaps(self) -> tuple[FloatArray, FloatArray]:
         """Largest margin in the overlap of two pieces, and where: shapes (P, P) and (P, P, m)."""
         count, m = len(self.pieces), self.functions.m
-        sets = piece_sets(self.functions, self.pieces, _NAMES[:m], apart=BARELY_APART)
+        sets = self.parts.linear(_NAMES[:m], apart=BARELY_APART)
         one, other = np.triu_indices(count, 1)
         solution = maximise_margins(
             sets.take(one).join(sets.take(other), on=_NAMES[:m]), self.solver
@@ -67,7 +75,9 @@ class PieceChains:
         place = np.broadcast_to(fractions, (len(j), self.functions.m))
         below = self.functions.exact_signs(rows, j, place) < 0
         above = self.functions.exact_signs(rows, k, place) > 0
-        return order[(below & above)[order]]
+        excess = np.einsum("prm,pm->pr", self.parts.rows, place) - self.parts.bounds
+        near = (excess <= _ROUNDING * self.functions.cones.size).all(axis=1)
+        return order[(below & above & near)[order]]
 
     def chain(self, f: FloatArray, g: FloatArray) -> tuple[list[int], list[FloatArray]]:
         """Return pieces that lead from one grasp to another.

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 
 from regrasp_lp.contact import Contact, Grasp
 from regrasp_lp.friction import FloatArray
@@ -26,6 +26,8 @@ class Execution:
         The finger of each contact of the first set, in the set's order.
     index : int
         The first set.
+    given : iterable of Contact, optional
+        Start and goal, to be hit exactly (see `GraspSets.grasp`).
     """
 
     def __init__(
@@ -35,8 +37,9 @@ class Execution:
         start: dict[int, Contact],
         fingers: Sequence[int],
         index: int,
+        given: Iterable[Contact] = (),
     ) -> None:
-        self._sets, self._hand = sets, hand
+        self._sets, self._hand, self._given = sets, hand, tuple(given)
         self._touching = dict(start)
         self._fingers = list(fingers)
         self._index = index
@@ -58,10 +61,6 @@ class Execution:
         self.steps.append(step)
         self.supports.append(self._support())
 
-    def _contact(self, slot: int, fraction: float) -> Contact:
-        edge = self._touching[self._fingers[slot]].edge
-        return self._sets.polygon.resolve_contact(Contact.at_fraction(edge, fraction))
-
     def _free_finger(self) -> int:
         return next(k for k in range(1, self._hand.fingers + 1) if k not in self._touching)
 
@@ -73,8 +72,8 @@ class Execution:
     def slide(self, fractions: FloatArray) -> None:
         """Slide to another grasp of the current set."""
         moves = {}
-        for slot, fraction in enumerate(fractions.tolist()):
-            contact = self._contact(slot, fraction)
+        grasp = self._sets.grasp(self._index, fractions, self._given)
+        for slot, contact in enumerate(grasp):
             if contact != self._touching[self._fingers[slot]]:
                 moves[self._fingers[slot]] = contact
         if moves:
@@ -99,18 +98,21 @@ class Execution:
 
     def switch(self, index: int, held: Sequence[tuple[int, int]], fractions: FloatArray) -> None:
         """Switch to another set: place its contacts that are not held, then release the others."""
-        grasp_set = self._sets[index]
-        fingers = [0] * len(grasp_set.edges)
+        grasp = self._sets.grasp(index, fractions, self._given)
+        fingers = [0] * len(grasp)
         for here, there in held:
             fingers[there] = self._fingers[here]
+        for finger in self._fingers:  # a finger that happens to be where one is wanted stays
+            where = [n for n, c in enumerate(grasp) if c == self._touching[finger]]
+            if where and fingers[where[0]] == 0 and finger not in fingers:
+                fingers[where[0]] = finger
         new = [slot for slot, finger in enumerate(fingers) if finger == 0]
         leaving = sorted(set(self._fingers) - set(fingers))
         for slot in new:
             fingers[slot] = self._free_finger()
-            contact = Contact.at_fraction(grasp_set.edges[slot], float(fractions[slot]))
             if slot == new[-1] and not leaving:
                 self._fingers, self._index = fingers, index
-            self._do(Place(fingers[slot], self._sets.polygon.resolve_contact(contact)))
+            self._do(Place(fingers[slot], grasp[slot]))
         self._fingers, self._index = fingers, index
         for finger in leaving:
             self._do(Release(finger))

@@ -11,6 +11,7 @@ are listed from these pairs.
 
 from __future__ import annotations
 
+from collections.abc import Iterable
 from dataclasses import dataclass, field
 from functools import partial
 
@@ -64,9 +65,33 @@ def problem_on_demand(
     path = path_on_demand(cones, np.sort(start.edges), np.sort(goal.edges))
     if path is None:
         return None
+    return problem_over(polygon, cones, solver, path, all_pairs=all_pairs)
+
+
+def problem_over(
+    polygon: Polygon,
+    cones: Cones,
+    solver: Solver,
+    combinations: Iterable[tuple[int, ...]],
+    *,
+    all_pairs: bool = False,
+) -> PlanningProblem:
+    """Return the planning problem of a hand of four fingers over some complete sets.
+
+    Parameters
+    ----------
+    polygon : Polygon
+    cones : Cones
+    solver : Solver
+    combinations : iterable of tuple of int
+        Edges of the sets, ascending; all of them exist.
+    all_pairs : bool
+        Add all two-finger sets.
+    """
+    wanted = set(combinations)
     families = []
     for m, kind in ((2, "two_finger"), (3, "three_finger")):
-        rows = sorted({edges for edges in path if len(edges) == m})
+        rows = sorted(edges for edges in wanted if len(edges) == m)
         edges = np.array(rows, dtype=np.intp).reshape(-1, m)
         if m == 2 and all_pairs:
             edges = np.unique(np.concatenate((edges, two_finger_candidates(cones))), axis=0)
@@ -198,7 +223,7 @@ def _between(cones: Cones, one: TorqueFunctions, other: TorqueFunctions) -> IntA
         pairs = np.unique(shadows((functions,), 2).edges, axis=0)
         both = np.unique(np.concatenate((pairs, pairs[:, ::-1])), axis=0)
         sides.append(both)
-    first, second = _matches(sides[0][:, :1], sides[1][:, :1])
+    first, second = matches(sides[0][:, :1], sides[1][:, :1])
     triples = np.column_stack((sides[0][first], sides[1][second, 1]))
     return _triples(cones, np.unique(_keys(cones, np.sort(triples, axis=1))))
 
@@ -206,7 +231,7 @@ def _between(cones: Cones, one: TorqueFunctions, other: TorqueFunctions) -> IntA
 def _adjacent(one: TorqueFunctions, other: TorqueFunctions) -> tuple[IntArray, IntArray]:
     """All pairs of sets of two stacks between which a switch can hold two contacts."""
     first, second = (shadows((functions,), 2) for functions in (one, other))
-    i, j = _matches(first.edges, second.edges)
+    i, j = matches(first.edges, second.edges)
     # A two-finger set and itself are no pair; a set is never in both stacks otherwise.
     if one.m == other.m == 2:
         return np.zeros(0, dtype=np.intp), np.zeros(0, dtype=np.intp)
@@ -214,8 +239,8 @@ def _adjacent(one: TorqueFunctions, other: TorqueFunctions) -> tuple[IntArray, I
     return first.row[i[yes]], second.row[j[yes]]
 
 
-def _matches(one: IntArray, other: IntArray) -> tuple[IntArray, IntArray]:
-    """All pairs of equal rows of two arrays."""
+def matches(one: IntArray, other: IntArray) -> tuple[IntArray, IntArray]:
+    """Return all pairs of equal rows of two arrays."""
     _, label = np.unique(np.concatenate((one, other)), axis=0, return_inverse=True)
     mine, theirs = label.ravel()[: len(one)], label.ravel()[len(one) :]
     order = np.argsort(theirs, kind="stable")

@@ -2,35 +2,31 @@
 
 A path of grasp sets is a chain of *stages*, one a set. In each the hand slides from an arriving
 grasp through the overlaps of pieces to a leaving grasp; across a switch the held contacts are
-equal. All of these grasps are variables, but for the start and the goal. The least tolerance is
-maximised; then, holding it, the travel ``Σ |u' - u|`` is minimised.
+equal. All of these grasps are variables, but for the start and the goal. The least tolerance (or
+margin) is maximised, then, if asked for, the second least and so on; then, holding them, the travel
+``Σ |u' - u|`` is minimised.
 """
 
 from __future__ import annotations
 
-import logging
 from collections.abc import Sequence
 from dataclasses import dataclass
+from itertools import product
 from typing import TYPE_CHECKING
 
 import numpy as np
 
-from regrasp_lp.errors import SolverError
 from regrasp_lp.friction import FloatArray, IntArray
-from regrasp_lp.grasp_sets.pieces import piece_sets
-from regrasp_lp.lp.solver import NAMES
+from regrasp_lp.grasp_sets.pieces import Measure, piece_sets
+from regrasp_lp.grasp_sets.set_pieces import SetPieces
+from regrasp_lp.linear_sets import LinearSets
 from regrasp_lp.torque import TorqueFunctions
 
 if TYPE_CHECKING:
     from scipy.sparse import csr_matrix
 
-_LOG = logging.getLogger("regrasp_lp")
-
-_KEEP = 1e-6
-"""Part of the tolerance that may be given up for travel, against rounding."""
-
-_SAME = 1e-6
-"""Fractions closer than this along a stage are one."""
+_FINGERS_APART = 2.0
+"""As `apart` of `piece_sets`: no two fingers meet, even if each is off by its tolerance."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -43,11 +39,19 @@ class Stage:
         Of the set.
     pieces : numpy.ndarray of int, shape (P, 3)
         Consecutive pieces (0, j, k), overlapping; there are P + 1 grasps, the first and the last
-        in one piece, those between in two.
+        in one piece, those between in two. If there are none there is one grasp.
+    entry, exit : LinearSets, optional
+        Where the first slide may end and the last one may begin, instead of the first and the last
+        piece, over "f0" to "f2": for slides from a given grasp and to one.
+    limits : SetPieces, optional
+        The same pieces with rows of limits of the hand, if there are any.
     """
 
     functions: TorqueFunctions
     pieces: IntArray
+    entry: LinearSets | None = None
+    exit: LinearSets | None = None
+    limits: SetPieces | None = None
 
 
 @dataclass(frozen=True, eq=False)
@@ -61,7 +65,9 @@ class PathProblem:
     given : list of numpy.ndarray, shape (P + 1, m)
         The given fractions, NaN elsewhere.
     rows, bounds, scales
-        A, b and s, in the unit of the object's size.
+        A, b and s, in the unit of the object's size; ``s = 0`` for rows that hold anyway.
+    owners : numpy.ndarray of int, shape (R,)
+        The grasp that a row is of, numbered through all stages.
     moves, offsets
         W and w.
     """
@@ -71,8 +77,14 @@ class PathProblem:
     rows: csr_matrix
     bounds: FloatArray
     scales: FloatArray
+    owners: IntArray
     moves: csr_matrix
     offsets: FloatArray
+
+    @property
+    def n_variables(self) -> int:
+        """Number of variables."""
+        return int(self.rows.shape[1])
 
     def grasps(self, x: FloatArray) -> list[FloatArray]:
         """Return the fractions of all grasps, per stage, for values of the variables."""
@@ -83,15 +95,24 @@ class PathProblem:
         ]
 
     def tolerance(self, x: FloatArray) -> float:
-        """Return the least tolerance that the rows leave at x, in the object's size."""
-        return float(np.min((self.bounds - self.rows @ x) / self.scales, initial=np.inf))
+        """Return the least tolerance or margin that the rows leave at x, in the object's size."""
+        free = self.scales > 0
+        slack = self.bounds - self.rows @ x
+        return float(np.min(slack[free] / self.scales[free], initial=np.inf))
+
+    def travel(self, x: FloatArray) -> float:
+        """Return the travel at x, in the object's size."""
+        return float(np.abs(self.moves @ x + self.offsets).sum())
 
 
 def build_path_problem(
     stages: Sequence[Stage],
     held: Sequence[Sequence[tuple[int, int]]],
-    start: FloatArray,
-    goal: FloatArray,
+    start: FloatArray | None,
+    goal: FloatArray | None,
+    measure: Measure = "tolerance",
+    apart: float = _FINGERS_APART,
+    couplings: Sequence[LinearSets | None] = (),
 ) -> PathProblem:
     """Return the path LP of a chain of stages.
 
@@ -100,144 +121,130 @@ def build_path_problem(
     stages : sequence of Stage
     held : sequence of sequence of (int, int)
         Per switch the held contacts, as places in the two sets.
-    start, goal : numpy.ndarray, shape (m,)
-        Fractions of the first and the last grasp.
+    start, goal : numpy.ndarray, shape (m,), or None
+        Fractions of the first and the last grasp; None if they are to be chosen, too.
+    measure : {"tolerance", "margin"}
+        What rows are scaled for.
+    apart : float
+        As for `piece_sets`.
+    couplings : sequence of LinearSets or None, optional
+        Per switch what limits the distances of the fingers of both grasps, as a stack of one over
+        the contacts of the first set and then those of the second that are not held.
 
     Returns
     -------
     PathProblem
     """
     variables, given = _number(stages, held, start, goal)
-    count = max((int(ids.max()) for ids in variables), default=-1) + 1
+    count = max((int(ids.max(initial=-1)) for ids in variables), default=-1) + 1
     size = stages[0].functions.cones.size
-    builder = _Rows(count)
-    travel = _Rows(count)
-    for stage, ids, fixed in zip(stages, variables, given, strict=True):
+    builder, travel = _Rows(count), _Rows(count)
+    owners: list[int] = []
+    first = 0
+    for t, (stage, ids, fixed) in enumerate(zip(stages, variables, given, strict=True)):
+        cells = _cells(stage, measure, apart)
+        known = np.where(ids < 0, fixed, 0.0)
         last = len(ids) - 1
-        nodes = [(n, p) for n in range(last + 1) for p in (n - 1, n) if 0 <= p < last]
-        nodes = [(n, p) for n, p in nodes if (ids[n] >= 0).all()]
-        names = [f"f{i}" for i in range(ids.shape[1])]
-        pieces = stage.pieces[[p for _, p in nodes]].reshape(-1, 3)
-        sets = piece_sets(stage.functions, pieces, names, measure="tolerance", apart=2.0)
-        for i, (node, _) in enumerate(nodes):
-            used = sets.scales[i] > 0
-            for row, bound, scale in zip(
-                sets.rows[i][used], sets.bounds[i][used], sets.scales[i][used], strict=True
-            ):
-                builder.add(ids[node], row / size, bound / size, scale)
+        for node in range(last + 1):
+            if (ids[node] < 0).all():
+                continue
+            # A slide that begins or ends at a given grasp has a cell of its own there.
+            for cell in [cells[p] for p in (node - 1, node) if 0 <= p < last]:
+                used = np.flatnonzero(cell.rows[0].any(axis=1))
+                for r in used.tolist():
+                    row, bound = cell.rows[0, r], cell.bounds[0, r]
+                    at = float(row @ known[node])
+                    builder.add(ids[node], row / size, (bound - at) / size, cell.scales[0, r])
+                    owners.append(first + node)
+        if t:
+            # Around a corner, fingers that leave and fingers that come may meet.
+            columns = np.concatenate((variables[t - 1][-1], ids[0]))
+            values = np.concatenate((given[t - 1][-1], fixed[0]))
+            rows = [(*r, apart) for r in round_corners(stages[t - 1], stage, held[t - 1])]
+            rows += _coupled(couplings[t - 1] if couplings else None, stages[t - 1], held[t - 1])
+            for row, bound, scale in rows:
+                at = float(row @ np.where(columns < 0, values, 0.0))
+                if (columns[row != 0] >= 0).any():
+                    builder.add(columns, row / size, (bound - at) / size, scale)
+                    owners.append(first)
+        first += last + 1
         lengths = stage.functions.lengths[0] / size
         for node in range(last):
-            for slot, length in enumerate(lengths):
+            for slot, length in enumerate(lengths.tolist()):
                 pair = [node, node + 1]
                 weight = length * np.array([-1.0, 1.0])
-                known = np.where(ids[pair, slot] < 0, fixed[pair, slot], 0.0)
-                travel.add(ids[pair, slot], weight, float(weight @ known), 1.0)
+                travel.add(ids[pair, slot], weight, float(weight @ known[pair, slot]), 1.0)
     return PathProblem(
         variables,
         given,
         builder.matrix(),
         np.array(builder.bounds),
         np.array(builder.scales),
+        np.array(owners, dtype=np.intp),
         travel.matrix(),
         np.array(travel.bounds),
     )
 
 
-def solve_path_problem(problem: PathProblem, solver: str) -> list[FloatArray]:
-    """Return the grasps of a path: largest least tolerance, then least travel.
+def round_corners(
+    stage: Stage, after: Stage, held: Sequence[tuple[int, int]]
+) -> list[tuple[FloatArray, float]]:
+    """Rows and bounds that keep contacts that leave from ones that come round a vertex.
 
-    Parameters
-    ----------
-    problem : PathProblem
-    solver : {"clarabel", "highs"}
-        For the tolerance. Travel is always minimised by HiGHS: a vertex has no tiny slides.
-
-    Returns
-    -------
-    list of numpy.ndarray, shape (P + 1, m)
-        Fractions of the grasps of each stage.
-
-    Raises
-    ------
-    SolverError
-        If both solvers failed.
+    Over the fractions of both sets: ``u - u' <= l`` where the edge of u' follows that of u.
     """
-    import cvxpy as cp
-
-    count = problem.rows.shape[1]
-    if count == 0:
-        return problem.grasps(np.zeros(0))
-    x, delta = cp.Variable(count), cp.Variable()
-    box = [x >= 0, x <= 1]
-    inside = [problem.rows @ x + delta * problem.scales <= problem.bounds]
-    _solve(cp.Problem(cp.Maximize(delta), inside + box), solver)
-    best = np.clip(np.asarray(x.value), 0.0, 1.0)
-    tolerance = problem.tolerance(best)
-    kept = tolerance - _KEEP * abs(tolerance)
-    inside = [problem.rows @ x <= problem.bounds - kept * problem.scales]
-    travel = cp.Minimize(cp.norm1(problem.moves @ x + problem.offsets))
-    _solve(cp.Problem(travel, inside + box), "highs")
-    short = _merge(problem, np.clip(np.asarray(x.value), 0.0, 1.0))
-    if problem.tolerance(short) >= tolerance - 1e-3 * abs(tolerance):
-        best = short
-    return problem.grasps(_merge(problem, best))
+    cones, m = stage.functions.cones, stage.functions.m
+    edges = np.concatenate((stage.functions.edges[0], after.functions.edges[0]))
+    leaving = [n for n in range(m) if n not in [here for here, _ in held]]
+    coming = [n for n in range(m, len(edges)) if n - m not in [there for _, there in held]]
+    found = []
+    for one, other in [*product(leaving, coming), *product(coming, leaving)]:
+        if (cones.ends[edges[one]] == cones.starts[edges[other]]).all():
+            row = np.zeros(len(edges))
+            row[one], row[other] = cones.lengths[edges[one]], -cones.lengths[edges[other]]
+            found.append((row, float(cones.lengths[edges[one]])))
+    return found
 
 
-def _solve(problem: object, solver: str) -> None:
-    """Solve by one solver, or by the other one where that fails."""
-    import cvxpy as cp
-
-    assert isinstance(problem, cp.Problem)
-    failures = []
-    for name in dict.fromkeys((solver, *NAMES)):
-        options = {}
-        if name == "highs":
-            options = {"primal_feasibility_tolerance": 1e-10, "dual_feasibility_tolerance": 1e-10}
-        try:
-            problem.solve(solver=cp.CLARABEL if name == "clarabel" else cp.HIGHS, **options)
-        except (KeyboardInterrupt, SystemExit, GeneratorExit):
-            raise
-        except BaseException as error:  # a panic of a solver written in Rust is no Exception
-            failures.append(f"{name} raised {type(error).__name__}: {error}")
-            continue
-        if problem.status == cp.OPTIMAL:
-            if failures:
-                _LOG.warning("path LP solved by %s: %s", name, "; ".join(failures))
-            return
-        failures.append(f"{name} stopped with status {problem.status!r}")
-    raise SolverError(f"the path LP is open, neither yes nor no: {'; '.join(failures)}")
+def _coupled(
+    coupling: LinearSets | None, stage: Stage, held: Sequence[tuple[int, int]]
+) -> list[tuple[FloatArray, float, float]]:
+    """Rows, bounds and scales of a coupling over all contacts of both sets."""
+    if coupling is None:
+        return []
+    m, n = stage.functions.m, len(coupling.names)
+    there = [slot for _, slot in held]
+    coming = [slot for slot in range(n - m + len(held)) if slot not in there]
+    columns = [*range(m), *(m + slot for slot in coming)]
+    found = []
+    for row, bound, scale in zip(
+        coupling.rows[0], coupling.bounds[0], coupling.scales[0], strict=True
+    ):
+        wide = np.zeros(n + len(held))
+        wide[columns] = row
+        found.append((wide, float(bound), float(scale)))
+    return found
 
 
-def _merge(problem: PathProblem, x: FloatArray) -> FloatArray:
-    """Make fractions equal that follow each other along a stage and differ by rounding.
-
-    From the goal backwards and then from the start forwards, so that whole runs become one.
-    """
-    x = x.copy()
-
-    def follow(leader: int, follower: int, given: float) -> None:
-        value = x[leader] if leader >= 0 else given
-        if follower >= 0 and abs(value - x[follower]) <= _SAME:
-            x[follower] = value
-
-    runs = [
-        (ids[node, slot], ids[node + 1, slot], given[node, slot], given[node + 1, slot])
-        for ids, given in zip(problem.variables, problem.given, strict=True)
-        for node in range(len(ids) - 1)
-        for slot in range(ids.shape[1])
-    ]
-    for now, after, _, fixed in reversed(runs):
-        follow(after, now, fixed)
-    for now, after, fixed, _ in runs:
-        follow(now, after, fixed)
-    return x
+def _cells(stage: Stage, measure: Measure, apart: float) -> list[LinearSets]:
+    """The convex set of each slide of a stage, as a stack of one."""
+    names = [f"f{i}" for i in range(stage.functions.m)]
+    if stage.limits is not None:
+        cells = list(stage.limits.linear(names, measure=measure, apart=apart))
+    else:
+        cells = list(piece_sets(stage.functions, stage.pieces, names, measure=measure, apart=apart))
+    if stage.entry is not None:
+        cells[0] = stage.entry
+    if stage.exit is not None:
+        cells[-1] = stage.exit
+    return cells
 
 
 def _number(
     stages: Sequence[Stage],
     held: Sequence[Sequence[tuple[int, int]]],
-    start: FloatArray,
-    goal: FloatArray,
+    start: FloatArray | None,
+    goal: FloatArray | None,
 ) -> tuple[list[IntArray], list[FloatArray]]:
     """Number the variables; held contacts are one variable on both sides of a switch."""
     variables: list[IntArray] = []
@@ -247,18 +254,27 @@ def _number(
         shape = (len(stage.pieces) + 1, stage.functions.m)
         ids = np.full(shape, -2)
         fixed = np.full(shape, np.nan)
-        if t == 0:
+        if t == 0 and start is not None:
             ids[0], fixed[0] = -1, start
-        else:
-            for here, there in held[t - 1]:
-                ids[0, there] = variables[-1][-1, here]
-        if t == len(stages) - 1:
-            ids[-1], fixed[-1] = -1, goal
+        for here, there in held[t - 1] if t else ():
+            ids[0, there] = variables[-1][-1, here]
+            fixed[0, there] = given[-1][-1, here]
         new = ids == -2
         ids[new] = count + np.arange(new.sum())
         count += int(new.sum())
         variables.append(ids)
         given.append(fixed)
+    if goal is not None:
+        # A stage of one grasp has it in common with the ones before, as far as it is held.
+        for variable, fraction in zip(variables[-1][-1].tolist(), goal.tolist(), strict=True):
+            for ids, fixed in zip(variables, given, strict=True):
+                same = (ids == variable) & (variable >= 0)
+                ids[same], fixed[same] = -1, fraction
+        variables[-1][-1], given[-1][-1] = -1, goal
+        left = np.unique(np.concatenate([ids.ravel() for ids in variables]))
+        renumbered = dict(zip(left[left >= 0].tolist(), range(len(left)), strict=False))
+        for ids in variables:
+            ids[ids >= 0] = [renumbered[v] for v in ids[ids >= 0].tolist()]
     return variables, given
 
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path
@@ -11,11 +11,15 @@ from types import MappingProxyType
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
+from numpy.typing import ArrayLike
 
 from regrasp_lp.contact import Contact, Grasp
 from regrasp_lp.files import write_atomically
 from regrasp_lp.friction import Cones, FloatArray
+from regrasp_lp.planning.along import instants, least_margin_along, least_tolerance_along
 from regrasp_lp.planning.hand import Hand
+from regrasp_lp.planning.objective import PLACEMENTS, Objective
+from regrasp_lp.planning.reach import hand_cones, room
 from regrasp_lp.planning.steps import Place, Release, Slide, Step
 from regrasp_lp.planning.verification import Report, verify_document
 from regrasp_lp.polygon import Polygon
@@ -23,6 +27,14 @@ from regrasp_lp.torque import TorqueFunctions, torque_functions
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
+
+    from regrasp_lp.planning.friction_change import LeastFriction
+    from regrasp_lp.planning.regions import Region
+    from regrasp_lp.planning.sensitivity import Sensitivity
+
+
+_ROUNDING = 1e-9
+"""Of the object's size: margins that differ by less are equal."""
 
 
 @dataclass(frozen=True)
@@ -58,7 +70,8 @@ class HeldGrasp:
         The set that the planner counts on, and its fingers.
     margin, tolerance : float
         Of the supporting fingers alone, in the object's unit (``docs/theory.md``); the other
-        touching fingers can only add to the margin.
+        touching fingers can only add to the margin. The tolerance is no more than what the hand's
+        limits leave to any touching finger.
     """
 
     after_step: int
@@ -90,6 +103,11 @@ class Plan:
     steps : tuple of Place, Release or Slide
     supports : tuple of Support
         One for the start and one after each step.
+    objective : Objective
+        What the plan was made best in.
+    bound : float, optional
+        What no plan can do better in the objective; None if that is not known, as of a plan that
+        was read from a file.
 
     Notes
     -----
@@ -103,6 +121,8 @@ class Plan:
     goal: Grasp
     steps: tuple[Step, ...]
     supports: tuple[Support, ...]
+    objective: Objective = PLACEMENTS
+    bound: float | None = None
 
     @cached_property
     def _touching(self) -> tuple[Mapping[int, Contact], ...]:
@@ -122,35 +142,62 @@ class Plan:
         return tuple(MappingProxyType(dict(sorted(state.items()))) for state in states)
 
     @cached_property
-    def _cones(self) -> Cones:
+    def cones(self) -> Cones:
+        """The friction cones of the edges."""
         return Cones.of(self.polygon, self.friction)
 
-    def _functions(self, contacts: list[Contact]) -> tuple[TorqueFunctions, FloatArray]:
-        grasp = Grasp(contacts)
-        return torque_functions(self._cones, grasp.edges[None, :]), grasp.fractions
+    @cached_property
+    def touchable(self) -> Cones:
+        """The same of what the hand may touch of them."""
+        return hand_cones(self.polygon, self.friction, self.hand)
+
+    def torques(
+        self, contacts: Mapping[int, Contact], support: Support
+    ) -> tuple[TorqueFunctions, FloatArray]:
+        """Return the torque functions of supporting fingers, and the fractions where they are."""
+        grasp = Grasp([contacts[finger] for finger in support.fingers])
+        return torque_functions(self.cones, grasp.edges[None, :]), grasp.fractions
 
     @cached_property
     def grasps(self) -> tuple[HeldGrasp, ...]:
         """The grasps held: at the start and after each step."""
         held = []
         for i, (contacts, support) in enumerate(zip(self._touching, self.supports, strict=True)):
-            functions, f = self._functions([contacts[k] for k in support.fingers])
+            functions, f = self.torques(contacts, support)
             margin, tolerance = float(functions.margins(f)[0]), float(functions.tolerances(f)[0])
+            tolerance = min(tolerance, room(self.touchable, self.hand, contacts.values()))
             held.append(HeldGrasp(i, contacts, support, margin, tolerance))
         return tuple(held)
 
     @cached_property
+    def slides(self) -> tuple[tuple[TorqueFunctions, FloatArray, FloatArray] | None, ...]:
+        """Of each step that is a slide the torque functions, and the fractions at both ends."""
+        found: list[tuple[TorqueFunctions, FloatArray, FloatArray] | None] = []
+        for i, step in enumerate(self.steps):
+            if isinstance(step, Slide):
+                before, after = self._touching[i : i + 2]
+                functions, f = self.torques(before, self.supports[i])
+                found.append((functions, f, self.torques(after, self.supports[i])[1]))
+            else:
+                found.append(None)
+        return tuple(found)
+
+    @cached_property
     def slide_margins(self) -> tuple[float, ...]:
         """The least margin along each step that is a slide; inf for the other steps."""
+        return tuple(np.inf if s is None else least_margin_along(*s) for s in self.slides)
+
+    @cached_property
+    def slide_tolerances(self) -> tuple[float, ...]:
+        """The least tolerance along each step that is a slide; inf for the other steps."""
         least = []
-        for i, step in enumerate(self.steps):
-            if not isinstance(step, Slide):
+        for i, slide in enumerate(self.slides):
+            if slide is None:
                 least.append(np.inf)
                 continue
-            fingers = self.supports[i].fingers
-            functions, f = self._functions([self._touching[i][k] for k in fingers])
-            _, g = self._functions([self._touching[i + 1][k] for k in fingers])
-            least.append(least_margin_along(functions, f, g))
+            passed = instants(self.polygon, *self._touching[i : i + 2])
+            left = (room(self.touchable, self.hand, contacts.values()) for contacts in passed)
+            least.append(min(least_tolerance_along(*slide), *left))
         return tuple(least)
 
     @property
@@ -169,19 +216,68 @@ class Plan:
         return min(grasp.tolerance for grasp in self.grasps)
 
     @cached_property
-    def _chosen(self) -> tuple[HeldGrasp, ...]:
-        given = (set(self.start.values()), set(self.goal))
-        return tuple(g for g in self.grasps if not any(set(g.grasp) <= part for part in given))
+    def _given(self) -> tuple[bool, ...]:
+        """Of each held grasp, whether it is (a part of) the start or the goal."""
+        ends = (set(self.start.values()), set(self.goal))
+        return tuple(any(set(g.grasp) <= end for end in ends) for g in self.grasps)
 
-    @property
+    def _least_chosen(self, held: Sequence[float], slides: Sequence[float]) -> float:
+        """The least over grasps that were free to choose and over slides.
+
+        A slide from or to a given grasp counts where it falls below that grasp, beyond rounding;
+        where other fingers take over there, it counts in any case.
+        """
+        least = min(
+            (v for v, given in zip(held, self._given, strict=True) if not given), default=np.inf
+        )
+        rounding = _ROUNDING * self.polygon.diameter
+        for i, value in enumerate(slides):
+            mine = self.supports[i].fingers
+            ends = [
+                held[n] for n in (i, i + 1) if self._given[n] and self.supports[n].fingers == mine
+            ]
+            if value < min(ends, default=np.inf) - rounding:
+                least = min(least, value)
+        return least
+
+    @cached_property
     def chosen_margin(self) -> float:
-        """The least margin over the grasps that were free to choose; inf if none was."""
-        return min((g.margin for g in self._chosen), default=np.inf)
+        """The least margin over what was free to choose; inf if nothing was.
+
+        Start and goal are given, and a slide from or to them counts only where it falls below them.
+        """
+        return self._least_chosen(self.margins, self.slide_margins)
+
+    @cached_property
+    def chosen_tolerance(self) -> float:
+        """The least tolerance over what was free to choose; inf if nothing was."""
+        held = [grasp.tolerance for grasp in self.grasps]
+        return self._least_chosen(held, self.slide_tolerances)
+
+    @cached_property
+    def travel(self) -> float:
+        """How far fingers slide, all together, in the object's unit."""
+        total = 0.0
+        for before, step in zip(self._touching[:-1], self.steps, strict=True):
+            if isinstance(step, Slide):
+                first, last = Grasp([before[k] for k in step.moves]), Grasp(step.moves.values())
+                moved = np.abs(last.fractions - first.fractions)
+                total += float(moved @ self.polygon.edge_lengths[last.edges])
+        return total
 
     @property
-    def chosen_tolerance(self) -> float:
-        """The least tolerance over the grasps that were free to choose; inf if none was."""
-        return min((g.tolerance for g in self._chosen), default=np.inf)
+    def value(self) -> float:
+        """How good the plan is in its objective (`Objective.value`)."""
+        return self.objective.value(self)
+
+    @property
+    def gap(self) -> float | None:
+        """How far from the best plan it can be: the distance of `value` and `bound`.
+
+        0 proves that no plan is better, to the accuracy of linear programs (a millionth of the
+        value); None if no bound is known.
+        """
+        return None if self.bound is None else self.objective.gap(self.value, self.bound)
 
     @property
     def placements(self) -> int:
@@ -210,6 +306,38 @@ class Plan:
             With ``ok`` and, if not, the first ``fault``.
         """
         return verify_document(self.to_document())
+
+    def sensitivity(self) -> Sensitivity:
+        """Return what limits margin and tolerance, what friction does, how far fingers may be off.
+
+        Raises
+        ------
+        NotForceClosureError
+            If the plan does not hold the object as it is.
+        """
+        from regrasp_lp.planning.sensitivity import sensitivity_of
+
+        return sensitivity_of(self)
+
+    def margins_at(
+        self, factors: ArrayLike | None = None, *, friction: ArrayLike | None = None
+    ) -> FloatArray:
+        """Return the plan's margin under other friction: see `friction_change.margins_at`."""
+        from regrasp_lp.planning.friction_change import margins_at
+
+        return margins_at(self, factors, friction=friction)
+
+    def least_friction(self) -> LeastFriction:
+        """Return the least factor of all friction under which the plan holds, exactly."""
+        from regrasp_lp.planning.friction_change import least_friction_of
+
+        return least_friction_of(self)
+
+    def regions(self) -> tuple[Region, ...]:
+        """Return the independent contact regions: how far each finger may be off at each step."""
+        from regrasp_lp.planning.regions import regions
+
+        return regions(self)
 
     def plot(self) -> Figure:
         """Draw the plan as a filmstrip (needs the extra "plot")."""
@@ -257,32 +385,3 @@ class Plan:
             f"<Plan {self.polygon.name!r}: {len(self.steps)} steps, "
             f"{self.placements} placements, margin {self.margin:.4g}>"
         )
-
-
-def least_margin_along(functions: TorqueFunctions, f: FloatArray, g: FloatArray) -> float:
-    """Return the least margin along the straight slide from fractions f to g.
-
-    ``max_k M_k/s_k`` and ``max_j -M_j/s_j`` are convex and piecewise linear along it, so each is
-    least at an end or where two of its functions cross.
-
-    Parameters
-    ----------
-    functions : TorqueFunctions
-        Of one combination.
-    f, g : numpy.ndarray, shape (m,)
-
-    Returns
-    -------
-    float
-    """
-    if not functions.spans[0]:
-        return -np.inf
-    start, end = (functions.certain_values(x)[0][functions.valid[0]] for x in (f, g))
-    change = end - start
-    apart = change[:, None] - change[None, :]
-    crossing = np.divide(
-        start[None, :] - start[:, None], apart, out=np.zeros(apart.shape), where=apart != 0
-    )
-    t = np.concatenate(([0.0], crossing[(crossing > 0) & (crossing < 1)]))
-    values = np.column_stack((start[:, None] + change[:, None] * t, end))
-    return float(min(values.max(axis=0).min(), (-values).max(axis=0).min()))

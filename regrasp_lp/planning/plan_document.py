@@ -55,6 +55,16 @@ class SlideStep:
 
 
 @dataclass(frozen=True)
+class LimitsDocument:
+    """What limits where the fingers of a hand may be; lengths in the unit of the object."""
+
+    max_span: float | None
+    edge_clearance: float
+    fingertip_separation: float
+    reachable: Mapping[int, tuple[tuple[float, float], ...]]
+
+
+@dataclass(frozen=True)
 class PlanDocument:
     """What the verification reads of a plan."""
 
@@ -62,6 +72,7 @@ class PlanDocument:
     holes: list[list[tuple[float, float]]]
     friction: list[float]
     fingers: int
+    limits: LimitsDocument
     start: tuple[PlaceStep, ...]
     goal: tuple[Place, ...]
     steps: tuple[PlaceStep | ReleaseStep | SlideStep, ...]
@@ -98,6 +109,7 @@ def parse_document(document: object) -> PlanDocument:
             for i, value in enumerate(_sequence(friction, "friction"))
         ],
         fingers=_integer(_entry(hand, "fingers", "hand."), "hand.fingers"),
+        limits=_limits(hand),
         start=tuple(_start_contact(item, i) for i, item in enumerate(start)),
         goal=tuple(_contact(item, f"goal[{i}]") for i, item in enumerate(goal)),
         steps=tuple(_step(item, f"steps[{i}]") for i, item in enumerate(steps)),
@@ -135,6 +147,37 @@ def read_plan_document(path: str | os.PathLike[str]) -> dict[str, Any]:
     except FileFormatError as error:
         raise FileFormatError(f"{path}: {error}") from error
     return cast("dict[str, Any]", document)
+
+
+def _limits(hand: Mapping[str, Any]) -> LimitsDocument:
+    lengths = ("max_span", "edge_clearance", "fingertip_separation")
+    unknown = sorted(set(hand) - {"fingers", *lengths, "reachable"})
+    if unknown:  # a limit that is not checked must not pass for one that holds
+        raise FileFormatError(f"hand.{unknown[0]}: no limit of a hand that this release knows")
+    given = {name: _number(hand[name], f"hand.{name}") for name in lengths if name in hand}
+    for name, value in given.items():
+        if value < 0:
+            raise FileFormatError(f"hand.{name}: expected a length, found {value!r}")
+    reachable: dict[int, tuple[tuple[float, float], ...]] = {}
+    for i, item in enumerate(_sequence(hand.get("reachable", []), "hand.reachable")):
+        where = f"hand.reachable[{i}]"
+        entry = _mapping(item, where)
+        edge = _integer(_entry(entry, "edge", f"{where}."), f"{where}.edge")
+        if edge in reachable:
+            raise FileFormatError(f"{where}.edge: edge {edge} is named twice")
+        intervals = _ring(_entry(entry, "intervals", f"{where}."), f"{where}.intervals")
+        for first, last in intervals:
+            if not 0 <= first <= last:
+                raise FileFormatError(
+                    f"{where}.intervals: expected 0 <= first <= last, found {[first, last]}"
+                )
+        reachable[edge] = tuple(intervals)
+    return LimitsDocument(
+        given.get("max_span"),
+        given.get("edge_clearance", 0.0),
+        given.get("fingertip_separation", 0.0),
+        reachable,
+    )
 
 
 def _start_contact(value: object, index: int) -> PlaceStep:

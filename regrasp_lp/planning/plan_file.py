@@ -35,7 +35,7 @@ def document_of(plan: Plan) -> dict[str, Any]:
             "holes": [ring.tolist() for ring in plan.polygon.holes],
         },
         "friction": plan.friction[:1].tolist() if uniform else plan.friction.tolist(),
-        "hand": {"fingers": plan.hand.fingers},
+        "hand": plan.hand.to_document(),
         "margin": plan.margin,
         "start": [{"finger": k, **_place(c)} for k, c in plan.start.items()],
         "goal": [_place(contact) for contact in plan.goal],
@@ -99,7 +99,7 @@ def plan_from_document(document: Mapping[str, Any]) -> Plan:
     return Plan(
         polygon,
         friction,
-        Hand(document["hand"]["fingers"]),
+        Hand.from_document(document["hand"]),
         start,
         Grasp([contact(c) for c in document["goal"]]),
         tuple(step(entry) for entry in document["steps"]),

@@ -30,6 +30,7 @@ from numpy.typing import NDArray
 
 from regrasp_lp.errors import FileFormatError
 from regrasp_lp.friction import per_edge_friction
+from regrasp_lp.planning.limit_checks import LimitChecks
 from regrasp_lp.planning.plan_document import (
     Place,
     PlaceStep,
@@ -96,7 +97,8 @@ def verify_document(document: Mapping[str, Any]) -> Report:
         a touching finger, releasing or sliding a free one, a slide that does not start where the
         finger is or that changes edges, a contact off its edge, two fingers at one point (also
         where two edges meet), fingers that pass each other, fingers that the hand does not have,
-        a goal that is not reached exactly.
+        at any time a contact or two fingers beyond a limit of the hand, a goal that is not reached
+        exactly.
 
     Raises
     ------
@@ -146,6 +148,7 @@ class _Replay:
     def __post_init__(self) -> None:
         self.polygon = _polygon(self.plan)
         self.friction = per_edge_friction(self.plan.friction, self.polygon.n_edges)
+        self.limits = LimitChecks(self.polygon, self.plan.limits)
 
     def run(self) -> None:
         plan = self.plan
@@ -209,6 +212,9 @@ class _Replay:
                     f"{move.start[1]!r}, where it is not"
                 )
             self._check_place(where, f"finger {move.finger}", move.end)
+            fault = self.limits.along(move.start, move.end)
+            if fault is not None:
+                raise _Fault(f"{where}: {self._named(move.finger)} {fault}")
             after[move.finger] = move.end
         for pair in combinations(sorted(after), 2):
             self._check_meeting(where, pair, after)
@@ -219,10 +225,18 @@ class _Replay:
     def _check_meeting(self, where: str, pair: tuple[int, int], after: dict[int, Place]) -> None:
         """Two points move at constant speed: the vector between them runs along a segment."""
         first, second = pair
-        (x0, y0), (x1, y1) = (
+        before, later = (
             _difference(self._point(places[first]), self._point(places[second]))
             for places in (self.held, after)
         )
+        nearest = self.limits.nearest(before, later)
+        # They are farthest from each other before or after the slide, when they rest.
+        fault = self.limits.apart(_between(before, later, nearest))
+        if fault is not None:
+            raise _Fault(
+                f"{where}: fingers {first} and {second} {fault}, at slide time {_time(nearest)}"
+            )
+        (x0, y0), (x1, y1) = before, later
         dot = x0 * x1 + y0 * y1
         if x0 * y1 != y0 * x1 or dot > 0:
             return
@@ -255,6 +269,11 @@ class _Replay:
             )
 
     def _check_rest(self, where: str) -> None:
+        for first, second in combinations(sorted(self.held), 2):
+            points = self._point(self.held[first]), self._point(self.held[second])
+            fault = self.limits.apart(_difference(*points))
+            if fault is not None:
+                raise _Fault(f"{where}: fingers {first} and {second} {fault}")
         contacts = ", ".join(self._named(finger) for finger in sorted(self.held)) or "no finger"
         if len(self.held) > 1:
             places = list(self.held.values())
@@ -298,6 +317,9 @@ class _Replay:
             )
         if not 0 <= fraction <= 1:
             raise _Fault(f"{where}: {who} off edge {edge}: fraction {fraction!r} is not in [0, 1]")
+        fault = self.limits.at(place)
+        if fault is not None:
+            raise _Fault(f"{where}: {who} at fraction {fraction!r} {fault}")
 
     def _point(self, place: Place) -> Point:
         edge, fraction = place[0], Fraction(place[1])
@@ -367,6 +389,10 @@ def _signs(determinants: NDArray[np.object_]) -> NDArray[np.int8]:
 
 def _difference(a: Point, b: Point) -> Point:
     return a[0] - b[0], a[1] - b[1]
+
+
+def _between(a: Point, b: Point, time: Fraction) -> Point:
+    return a[0] + time * (b[0] - a[0]), a[1] + time * (b[1] - a[1])
 
 
 def _title(step: PlaceStep | ReleaseStep | SlideStep) -> str:

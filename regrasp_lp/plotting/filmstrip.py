@@ -18,10 +18,11 @@ from matplotlib.text import Text
 
 from regrasp_lp.contact import Contact
 from regrasp_lp.errors import OptionError
+from regrasp_lp.planning.regions import Region, regions
 from regrasp_lp.planning.steps import Place, Release, Slide
 from regrasp_lp.plotting import palette
 from regrasp_lp.plotting.frame import POINTS_PER_INCH, OwnFigure
-from regrasp_lp.plotting.grasps import COMMON_CONE, GraspArtists, plot_grasp
+from regrasp_lp.plotting.grasps import BAND, COMMON_CONE, GraspArtists, plot_grasp
 
 if TYPE_CHECKING:
     from regrasp_lp.planning.plan import Plan
@@ -68,8 +69,10 @@ def plot_plan(plan: Plan, *, columns: int | None = None, dpi: float = 110.0) -> 
     Fingers that support the object are blue, with their friction cones (for parallel grasps the
     common cone) or, if they are two, joined by a dashed line; fingers that only touch are white.
     A finger that was placed or has slid is vermillion, a released one grey and hollow, and an
-    arrow leads from where a finger slid. Over each panel stand the step, the supporting fingers
-    and their margin; of a slide also the least margin on the way, where that is less.
+    arrow leads from where a finger slid. Bands along the edges show where the supporting fingers
+    may be, each on its own: the independent contact regions of `Plan.regions`. Over each panel
+    stand the step, the supporting fingers and their margin; of a slide also the least margin on
+    the way, where that is less.
 
     Parameters
     ----------
@@ -91,14 +94,16 @@ def plot_plan(plan: Plan, *, columns: int | None = None, dpi: float = 110.0) -> 
         If `columns` is not a positive integer.
     """
     held = plan.grasps
-    key = _key(plan)
+    # A plan that does not hold has none; its margins say so.
+    found = regions(plan, slides=False) if min(plan.margins) > 0 else ()
+    key = _key(plan, bands=bool(found))
     grid = _layout(plan.polygon, len(held), len(key), columns)
     figure = OwnFigure(grid.size, dpi)
     _write_head(figure, plan)
     for i in range(len(held)):
         ax = figure.add_axes(grid.panel(i), label=f"panel {i}")
         ax.set_axis_off()
-        _draw_panel(plan, i, ax)
+        _draw_panel(plan, i, ax, found[i] if found else None)
         _write_title(figure, ax, plan, i)
     columns_of_key = math.ceil(len(key) / grid.key_lines)
     figure.legend(
@@ -137,7 +142,7 @@ def _layout(polygon: Polygon, panels: int, entries: int, columns: int | None) ->
     return _Grid(math.ceil(panels / columns), columns, width, height, key_lines)
 
 
-def _draw_panel(plan: Plan, index: int, ax: Axes) -> GraspArtists:
+def _draw_panel(plan: Plan, index: int, ax: Axes, region: Region | None) -> GraspArtists:
     """Draw what is held after `index` steps, and what the last of them changed."""
     grasp = plan.grasps[index]
     moved = _moved(plan, index)
@@ -157,6 +162,7 @@ def _draw_panel(plan: Plan, index: int, ax: Axes) -> GraspArtists:
         highlight=moved,
         released=released,
         slid_from=slid_from,
+        regions=region.intervals if region else {},
     )
 
 
@@ -261,7 +267,7 @@ def _shrink(figure: Figure, texts: list[Text], width: float) -> None:
             text.set_fontsize(float(text.get_fontsize()) * 0.98 * width / wide)
 
 
-def _key(plan: Plan) -> list[Line2D | Patch]:
+def _key(plan: Plan, *, bands: bool) -> list[Line2D | Patch]:
     """Return what the signs mean, as far as they occur in the plan."""
     sizes = {len(grasp.support.fingers) for grasp in plan.grasps}
     actions = {type(step) for step in plan.steps}
@@ -280,6 +286,7 @@ def _key(plan: Plan) -> list[Line2D | Patch]:
         (None in centers, Patch(facecolor=fill, edgecolor=palette.SKY, label="friction cone")),
         (any(c is not None for c in centers), Patch(label="common cone", **_COMMON_CONE)),
         (2 in sizes, Line2D([], [], linewidth=1.4, label="two-finger grasp", **line)),
+        (bands, Line2D([], [], label="where it may be", **BAND)),
     ]
     return [sign for occurs, sign in signs if occurs]
 

@@ -44,6 +44,12 @@ _CONE: dict[str, Any] = {
     "linewidth": 0.6,
     "zorder": palette.CONE_LAYER,
 }
+BAND: dict[str, Any] = {
+    "color": palette.ORANGE,
+    "linewidth": 4.0,
+    "solid_capstyle": "butt",
+    "zorder": palette.BAND_LAYER,
+}
 COMMON_CONE: dict[str, Any] = {
     **_CONE,
     "facecolor": (palette.PURPLE, 0.35),
@@ -89,6 +95,8 @@ class GraspArtists(Drawing):
         Joins the contacts of two supporting fingers.
     arrows : mapping of int to matplotlib.patches.FancyArrowPatch
         From where a finger was to where it has slid.
+    bands : mapping of int to matplotlib.lines.Line2D
+        Where fingers may be.
     """
 
     polygon: PolygonArtists
@@ -97,6 +105,7 @@ class GraspArtists(Drawing):
     cones: Mapping[int, Wedge]
     line: Line2D | None
     arrows: Mapping[int, FancyArrowPatch]
+    bands: Mapping[int, Line2D]
 
 
 def plot_grasp(
@@ -111,6 +120,7 @@ def plot_grasp(
     highlight: Collection[int] = (),
     released: Mapping[int, Contact] | None = None,
     slid_from: Mapping[int, Contact] | None = None,
+    regions: Mapping[int, tuple[Contact, Contact]] | None = None,
     edge_numbers: bool = False,
 ) -> GraspArtists:
     """Draw an object and the fingers that touch it.
@@ -143,6 +153,8 @@ def plot_grasp(
     slid_from : mapping of int to Contact, optional
         Where fingers were before they slid to where they are: drawn as arrows beside the edge,
         at least 11 points long.
+    regions : mapping of int to (Contact, Contact), optional
+        First and last place where fingers may be, on their edges: drawn as bands.
     edge_numbers : bool, optional
         Whether to number the edges.
 
@@ -156,7 +168,7 @@ def plot_grasp(
     ContactError, FrictionError
         If a contact is not on the object, or friction is none.
     OptionError
-        If `support`, `highlight` or `slid_from` name a finger that does not touch.
+        If `support`, `highlight`, `slid_from` or `regions` name a finger that does not touch.
 
     Examples
     --------
@@ -169,12 +181,21 @@ def plot_grasp(
     now, gone = _resolved(polygon, contacts), _resolved(polygon, released or {})
     before = _resolved(polygon, slid_from or {})
     holding = tuple(now) if support is None else tuple(sorted(support))
-    for what, named in (("support", holding), ("highlight", highlight), ("slid_from", before)):
+    for what, named in (
+        ("support", holding),
+        ("highlight", highlight),
+        ("slid_from", before),
+        ("regions", regions or {}),
+    ):
         _check_touching(what, named, now)
     drawn = plot_polygon(polygon, ax, edge_numbers=False)
     frame = Frame.of(drawn.ax)
     supporting = {k: now[k] for k in holding if cones}
     wedges, line = _draw_support(drawn, polygon, friction_cones, supporting, center)
+    bands = {
+        k: draw_line(drawn.ax, np.stack([_at(polygon, end) for end in ends]), **BAND)
+        for k, ends in (regions or {}).items()
+    }
     moves = ((k, _draw_arrow(drawn.ax, polygon, frame, before[k], now[k])) for k in before)
     arrows = {k: arrow for k, arrow in moves if arrow is not None}
     avoid = [_at(polygon, c) for c in (*now.values(), *gone.values(), *before.values())]
@@ -196,6 +217,7 @@ def plot_grasp(
         MappingProxyType(wedges),
         line,
         MappingProxyType(arrows),
+        MappingProxyType(bands),
     )
 
 

@@ -15,7 +15,7 @@ BLUE = "#0072B2"  # fingers that touch
 VERMILLION = "#D55E00"  # what has just moved
 SKY = "#56B4E9"  # friction cones
 GREEN = "#00795A"  # line of a two-finger grasp: bluish green, darkened to show on white
-ORANGE = "#E69F00"  # a focus cell; an outer region
+ORANGE = "#E69F00"  # a focus cell; an outer region; where a finger may be
 PURPLE = "#CC79A7"  # a second one
 PALE_YELLOW = "#F7F09A"  # where two focus cells meet
 SET = "#009E73"  # a grasp set in contact space: bluish green
@@ -46,5 +46,5 @@ FINGER_GAP = 7.0  # from the contact to the circle of its finger
 MARGIN = 30.0  # room around the object for fingers and numbers
 
 OBJECT_LAYER, CONE_LAYER, OUTLINE_LAYER, LINE_LAYER = 1.0, 1.5, 2.0, 3.0
-CELL_LAYER, EDGE_LAYER, REGION_LAYER = 1.2, 2.2, 2.6
+CELL_LAYER, BAND_LAYER, EDGE_LAYER, REGION_LAYER = 1.2, 1.8, 2.2, 2.6
 ARROW_LAYER, LEADER_LAYER, CONTACT_LAYER, FINGER_LAYER, TEXT_LAYER = 4.0, 5.0, 6.0, 7.0, 8.0

@@ -3,11 +3,12 @@
 from __future__ import annotations
 
 import argparse
+import importlib.util
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 
-from bench import clocks, growth, one_by_one, planning, ratio, subjects, where
+from bench import clocks, gcs, growth, one_by_one, planning, ratio, subjects, where
 from bench.growth import Growth
 from bench.ratio import Meeting
 from bench.report import Table, machine
@@ -81,12 +82,21 @@ def run_planning(options: argparse.Namespace, results: Results) -> None:
     results.add(planning.measure_small(small, pairs, min(options.repeats, 3)))
 
 
+def run_gcs(options: argparse.Namespace, results: Results) -> None:
+    if importlib.util.find_spec("gcsopt") is None:
+        results.add(gcs.missing())
+        return
+    found = [gcs.compare(instance) for instance in gcs.instances(options.quick)]
+    results.add(gcs.table([one for one in found if one is not None]))
+
+
 PARTS: dict[str, Callable[[argparse.Namespace, Results], None]] = {
     "ratio": run_ratio,
     "where": run_where,
     "growth": run_growth,
     "checks": run_checks,
     "planning": run_planning,
+    "gcs": run_gcs,
 }
 
 
@@ -94,7 +104,7 @@ def parser() -> argparse.ArgumentParser:
     result = argparse.ArgumentParser(
         prog="python tests/bench",
         description="Measure the package: against the chapter's method on GEOS, where its time "
-        "goes, growth, one LP at a time, and planning without the graph.",
+        "goes, growth, one LP at a time, planning without the graph, and gcsopt.",
         epilog="Needs the extras of the tests (pip install -e '.[test]'). Takes about a quarter "
         "of an hour; leave the machine alone meanwhile. Outlines of a corpus are planned on if "
         "REGRASP_LP_CORPUS names its folder.",

@@ -1,0 +1,58 @@
+"""Options for the hand: how many fingers it has, and what limits where they may be."""
+
+from __future__ import annotations
+
+from argparse import Namespace
+from typing import Any
+
+from regrasp_lp.cli import values
+from regrasp_lp.planning.hand import Hand
+
+_LENGTHS = (
+    ("--max-span", None, "largest distance between two touching fingers"),
+    ("--edge-clearance", 0.0, "distance that fingers keep from the ends of an edge"),
+    ("--fingertip-separation", 0.0, "smallest distance between two touching fingers"),
+)
+
+
+def add_hand(group: Any) -> None:
+    """Add the options to a group of a parser."""
+    group.add_argument(
+        "--fingers",
+        type=values.fingers,
+        default=4,
+        metavar="K",
+        help="fingers of the hand, 3 or more (default: 4)",
+    )
+    for option, default, what in _LENGTHS:
+        group.add_argument(
+            option,
+            type=values.length,
+            default=default,
+            metavar="LENGTH",
+            help=f"{what}, in the object's unit (default: no limit)",
+        )
+    group.add_argument(
+        "--avoid-edges",
+        type=values.edge_numbers,
+        default=[],
+        metavar="EDGES",
+        help="edges that may not be touched: their numbers, separated by commas",
+    )
+
+
+def hand_of(options: Namespace) -> Hand:
+    """Return the hand that is asked for.
+
+    Raises
+    ------
+    HandError
+        If its limits make no sense.
+    """
+    return Hand(
+        options.fingers,
+        options.max_span,
+        options.edge_clearance,
+        options.fingertip_separation,
+        dict.fromkeys(options.avoid_edges),
+    )
