@@ -185,7 +185,7 @@ def _route_in(graph: SwitchingGraph, start: Grasp, goal: Grasp) -> Route | None:
 
 def _joined_in(graph: SwitchingGraph, sources: Set[int], targets: Set[int]) -> bool:
     """Whether a path leads from one of the sources to one of the targets."""
-    free = graph.hand.needs[2, 2:] == 0
+    free = graph.hand.adjacent[2, 2:]
     if free.all() and (graph.sets.contacts == 2).any():
         return True  # two-finger sets are adjacent to all sets
     return any(c & sources and c & targets for c in graph.components())

@@ -158,9 +158,7 @@ def best_points(functions: TorqueFunctions, pieces: IntArray) -> FloatArray:
     )
 
 
-def optimal_points(
-    alpha: FloatArray, a: FloatArray, beta: FloatArray, b: FloatArray
-) -> FloatArray:
+def optimal_points(alpha: FloatArray, a: FloatArray, beta: FloatArray, b: FloatArray) -> FloatArray:
     """Return where the optima of `largest_margins` are attained, as `best_points` chooses them.
 
     Parameters

@@ -11,7 +11,7 @@ import pytest
 
 pytest.importorskip("shapely")
 
-from bench import clocks, command, growth, where
+from bench import clocks, command, growth, queries, where
 from bench.clocks import Memory, in_own_process
 from bench.one_by_one import pairs_to_decide
 from bench.peer import PeerGraph, interiors_meet, peer_graph
@@ -24,6 +24,7 @@ from geometry import comb, ell, rectangle, regular, star
 from reference import Key, ReferenceGraph, reference_graph
 
 import regrasp_lp as rl
+from regrasp_lp.planning.bottleneck import Search
 
 SMALL = {
     "rectangle": rectangle(),
@@ -228,6 +229,52 @@ def test_random_grasps_are_held() -> None:
     assert all(rl.is_force_closure(polygon, grasp, MU) for grasp in grasps)
 
 
+# --- queries ------------------------------------------------------------------------------------
+
+
+def test_queries_on_a_graph() -> None:
+    polygon = SMALL["star_15"]
+    graph = rl.build_switching_graph(polygon, MU)
+    pairs = queries.pairs_of(polygon, MU, 4)
+    assert pairs == queries.pairs_of(polygon, MU, 4), "the same in every run"
+    found = queries.on_graph(graph, pairs, "margin")
+    assert len(found) == len(pairs) == 4
+    for query, (start, goal) in zip(found, pairs, strict=True):
+        plan = graph.plan(start, goal, objective="margin")
+        assert (query.value, query.bound, query.gap) == (plan.value, plan.bound, plan.gap)
+        assert query.fewest == graph.plan(start, goal).chosen_margin <= query.value
+        assert (query.levels == 0) == np.isinf(query.value), "without a choice nothing is searched"
+        assert query.seconds > 0
+    assert any(query.levels for query in found)
+
+
+def test_searches_are_counted_inside_only() -> None:
+    plain = Search.run
+    with queries.counted_levels() as levels:
+        assert Search.run is not plain
+    assert Search.run is plain
+    assert levels == []
+
+
+def test_queries_without_an_answer() -> None:
+    def refused() -> rl.Plan:
+        raise rl.NoPlanFound("none")
+
+    assert queries.ask(refused, 4, "margin") is None
+
+
+def test_what_is_said_of_queries() -> None:
+    best = queries.Query(4, 0.1, 2.0, 2.0, 0.0, 3, 2.0)
+    open_ = dataclasses.replace(best, seconds=0.3, value=1.5, gap=0.5, levels=5)
+    direct = dataclasses.replace(best, seconds=0.2, value=np.inf, bound=np.inf, levels=0)
+    assert [query.worse for query in (best, open_, direct)] == [False, True, False]
+    assert [query.short for query in (best, open_, direct)] == [0, 0.25, 0]
+    assert dataclasses.replace(open_, gap=np.inf, bound=np.inf).short == 1
+    cells = queries._cells([best, open_, direct])
+    assert cells == ["3", "1", "200", "280", "300", "66.7 %", "25 %", "8, 5"]
+    assert len(cells) == len(queries._HEADINGS)
+
+
 # --- the command --------------------------------------------------------------------------------
 
 
@@ -238,7 +285,7 @@ def test_every_part_runs(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> 
     printed = capsys.readouterr().out
     written = (tmp_path / "benchmarks.md").read_text(encoding="utf-8")
     titles = [line[4:] for line in written.splitlines() if line.startswith("### ")]
-    assert len(titles) == 8
+    assert len(titles) == 12
     assert all(title in printed for title in titles)
     pictures = sorted((tmp_path / "images").glob("*.png"))
     assert [picture.name for picture in pictures] == ["benchmark_growth.png", "benchmark_ratio.png"]

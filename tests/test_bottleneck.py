@@ -15,8 +15,10 @@ import regrasp_lp as rl
 from regrasp_lp.planning.along import least_margin_along, least_tolerance_along
 from regrasp_lp.planning.ends import supports
 from regrasp_lp.planning.levels import PieceRows
+from regrasp_lp.planning.moves import KnownMoves
 from regrasp_lp.planning.path_lp import PathProblem, Stage, build_path_problem
 from regrasp_lp.planning.path_optimum import largest_tolerance, solve_path_problem
+from regrasp_lp.switches import StoredSwitches
 from regrasp_lp.torque import TorqueFunctions
 
 MEASURES = ("margin", "tolerance")
@@ -112,6 +114,25 @@ def test_landings_are_the_best_of_all_pieces_that_are_seen(name: str) -> None:
             assert max(expected, level) == pytest.approx(support.widest, rel=1e-6)
             landed += expected > level
     assert landed
+
+
+@pytest.mark.parametrize("measure", MEASURES)
+def test_no_way_away_from_a_grasp_is_wider_than_its_cap(measure: str) -> None:
+    """The cap looks at the best sets first and stops: it is the largest of all."""
+    polygon = you()
+    graph = rl.build_switching_graph(polygon, 0.3)
+    assert isinstance(graph.switches, StoredSwitches)
+    rows = PieceRows(graph.sets.sources, measure)
+    moves = KnownMoves(rows, graph.switches, graph.hand)
+    rng = np.random.default_rng(8)
+    wider = 0
+    for contacts in (2, 3):
+        for grasp in random_grasps(polygon, 0.3, rng, 5, contacts, at_vertices=0.2):
+            for support in supports(rows, graph.sets, polygon.resolve(grasp)):
+                onward = [support.onward(choices).max() for choices in moves.of(support.index)]
+                assert support.cap(moves) == max(support.widest, *onward)
+                wider += max(onward) > support.widest
+    assert wider
 
 
 # --- the path LP of a route ---------------------------------------------------------------------

@@ -120,6 +120,26 @@ def test_levels_are_those_of_linear_programs(name: str, measure: str) -> None:
 
 
 @pytest.mark.parametrize("measure", MEASURES)
+@pytest.mark.parametrize("name", SUBJECTS)
+def test_levels_from_a_least_one_on_are_the_same(name: str, measure: str) -> None:
+    """All others are lower, or -inf."""
+    rows = rows_of(name, measure)
+    rng = np.random.default_rng(3)
+    every = np.arange(len(rows))
+    slots = np.zeros((len(rows), 1), dtype=np.intp)
+    values = rng.choice([0.0, 1.0, *rng.random(4)], (len(rows), 1))
+    for least in (0.0, 0.3 * float(rows.best.max()), float(np.median(rows.best))):
+        for whole, part in (
+            (rows.levels(every), rows.levels(every, least)),
+            (rows.completed(every, slots, values), rows.completed(every, slots, values, least)),
+        ):
+            kept = np.isfinite(part)
+            assert (part[kept] == whole[kept]).all()
+            assert (whole[~kept] < least + 1e-12).all()
+            assert kept.sum() < np.isfinite(whole).sum()
+
+
+@pytest.mark.parametrize("measure", MEASURES)
 @pytest.mark.parametrize("name", ["ell", "square", "you"])
 def test_levels_with_contacts_given_are_those_of_linear_programs(name: str, measure: str) -> None:
     rows = rows_of(name, measure)

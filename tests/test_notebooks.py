@@ -14,7 +14,13 @@ NOTEBOOKS = sorted(FOLDER.glob("*.ipynb"))
 
 
 def test_there_are_notebooks() -> None:
-    assert [path.stem for path in NOTEBOOKS] == ["coverage", "grasp_sets", "regrasps", "tables"]
+    assert [path.stem for path in NOTEBOOKS] == [
+        "coverage",
+        "grasp_sets",
+        "objectives",
+        "regrasps",
+        "tables",
+    ]
 
 
 @pytest.mark.parametrize("path", NOTEBOOKS, ids=lambda path: path.stem)

@@ -113,3 +113,19 @@ def test_a_plan_that_was_read_has_no_bound(tmp_path) -> None:
     again = rl.read_plan(tmp_path / "plan.json")
     assert (again.bound, again.gap) == (None, None)
     assert again.chosen_margin == plan.chosen_margin
+
+
+def test_travel_within_rounding_of_none_is_none() -> None:
+    """A plan with a few placements and a slide of 1e-14 is better than one with many and none."""
+    bracket = [(0, 0), (60, 0), (60, 10), (10, 10), (10, 50), (0, 50)]
+    graph = rl.build_switching_graph(rl.Polygon(bracket), 0.3)
+    grasps = [(0, 20), (0, 50), (2, 20)], [(3, 10), (5, 10), (5, 35)]
+    plan = graph.plan(*grasps, objective="travel")
+    assert plan.travel < 1e-9
+    assert plan.gap == 0
+    assert plan.placements == graph.plan(*grasps).placements == 3
+
+
+@pytest.mark.parametrize(("name", "bound"), [("travel", -np.inf), ("margin", np.inf)])
+def test_what_is_not_bounded_has_no_proof(name: str, bound: float) -> None:
+    assert Objective.of(name).gap(1.0, bound) == np.inf

@@ -512,3 +512,11 @@ def test_keys_can_be_left_out(chapter: SwitchingGraph) -> None:
         ):
             assert (artists.ax.get_legend() is not None) == key
             assert repr(artists).startswith(f"<{type(artists).__name__} on <Axes")
+
+
+def test_sets_of_a_limited_hand_are_not_drawn() -> None:
+    polygon = rl.Polygon([(0, 0), (6, 0), (6, 3), (0, 3)])
+    for hand in (rl.Hand(edge_clearance=0.1), rl.Hand(max_span=6.0)):
+        grasp_set = rl.build_switching_graph(polygon, 0.4, hand).sets[-1]
+        with pytest.raises(rl.OptionError, match="hands without limits"):
+            plot_contact_space(grasp_set)

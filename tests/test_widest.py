@@ -139,6 +139,19 @@ def test_the_same_among_the_chapters_sets(name: str) -> None:
     assert compared
 
 
+def test_the_bound_counts_margins_of_grasps_not_of_the_chapters_functions() -> None:
+    """Found by random motions: one slide within a parallel set to a grasp above its own measure."""
+    polygon = MAKE["star 8"]()
+    graph = rl.build_switching_graph(polygon, 0.15, sets="chapter")
+    start = fractions((0, 0.25), (1, 0.2838605224799785), (5, 0.626579244972611))
+    goal = fractions((5, 0.33720162968611744), (0, 0.9060246414298914), (0, 0.364250455292665))
+    between = fractions((0, 0.1661524572911217), (1, 0.8826838613003293), (5, 0.33720162968611744))
+    assert {graph.sets[i].kind for i in graph.locate(between)} == {"parallel"}
+    plan = graph.plan(start, goal, objective="margin")
+    assert plan.bound is not None
+    assert plan.bound >= float(rl.margin(polygon, between, 0.15)) > plan.value
+
+
 # --- random motions -----------------------------------------------------------------------------
 
 

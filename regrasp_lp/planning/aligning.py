@@ -15,7 +15,7 @@ from itertools import pairwise
 import numpy as np
 
 from regrasp_lp.errors import SolverError
-from regrasp_lp.friction import FloatArray, IntArray
+from regrasp_lp.friction import BoolArray, FloatArray, IntArray
 from regrasp_lp.grasp_sets.pieces import BARELY_APART, piece_sets
 from regrasp_lp.grasp_sets.set_pieces import SetPieces
 from regrasp_lp.lp import Solver, maximise_margins
@@ -77,7 +77,8 @@ class PieceChains:
         above = self.functions.exact_signs(rows, k, place) > 0
         excess = np.einsum("prm,pm->pr", self.parts.rows, place) - self.parts.bounds
         near = (excess <= _ROUNDING * self.functions.cones.size).all(axis=1)
-        return order[(below & above & near)[order]]
+        inside: BoolArray = below & above & near
+        return order[inside[order]]
 
     def chain(self, f: FloatArray, g: FloatArray) -> tuple[list[int], list[FloatArray]]:
         """Return pieces that lead from one grasp to another.

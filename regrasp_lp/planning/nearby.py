@@ -132,9 +132,10 @@ def _widest(
         if plan is not None and plan.gap == 0:
             return plan
     first = {*start.edges.tolist(), *goal.edges.tolist(), *(e for edges in path for e in edges)}
-    # Long edges are where grasps are good, whatever their neighbours.
-    promising, longest = np.argsort(-around.promise, kind="stable"), np.argsort(-cones.lengths)
-    wanted = list(dict.fromkeys([*first, *np.stack((promising, longest), 1).ravel().tolist()]))
+    # Good next to both, or to one of them; and long edges are where grasps are good anyway.
+    ranked = (around.promise.sum(axis=0), *around.promise, cones.lengths)
+    orders = [np.argsort(-values, kind="stable") for values in ranked]
+    wanted = list(dict.fromkeys([*first, *np.stack(orders, axis=1).ravel().tolist()]))
     best: Plan | None = None
     for count in _SOME:
         edges = np.sort(np.array(wanted[: max(count, len(first))]))
@@ -219,16 +220,20 @@ class Surroundings:
 
     @cached_property
     def promise(self) -> FloatArray:
-        """For each edge the largest level of a neighbour on it, -inf for none, shape (n,)."""
+        """For each edge the largest level, up to `cap`, of a neighbour on it, shape (2, n).
+
+        Of neighbours of the start, and of the goal; 0 if there is none.
+        """
         rows, ends = self._problem
-        promise = np.full(self.cones.n_edges, -np.inf)
-        for support in (*ends[0], *ends[1]):
-            for contacts in self._moves.of(support.index):
-                levels = support.onward(contacts, 0.0).max(axis=(1, 2), initial=-np.inf)
-                for column in rows.edges[contacts.others].T:
-                    there = column >= 0
-                    np.maximum.at(promise, column[there], levels[there])
-        return promise
+        promise = np.zeros((2, self.cones.n_edges))
+        for side, sources in zip(promise, ends, strict=True):
+            for support in sources:
+                for contacts in self._moves.of(support.index):
+                    levels = support.onward(contacts, 0.0).max(axis=(1, 2), initial=0.0)
+                    for column in rows.edges[contacts.others].T:
+                        there = column >= 0
+                        np.maximum.at(side, column[there], levels[there])
+        return np.minimum(promise, self.cap)
 
     def out_of_reach(self, level: float) -> bool:
         """Whether a search from the start or the goal proves that no route reaches a level."""

@@ -20,7 +20,7 @@ from regrasp_lp.errors import OptionError
 from regrasp_lp.friction import FloatArray
 from regrasp_lp.grasp_sets.collection import GraspSet
 from regrasp_lp.plotting import palette
-from regrasp_lp.plotting.frame import Drawing, OwnFigure
+from regrasp_lp.plotting.frame import Drawing, OwnFigure, check_drawable
 from regrasp_lp.plotting.regions import body, faces_of, shadows, side, sides
 from regrasp_lp.polytopes import corners
 
@@ -107,6 +107,7 @@ def plot_subpolytopes(
     OptionError
         If the set is not parallel, or the axes have no depth.
     """
+    check_drawable(grasp_set)
     if grasp_set.subpolytopes is None:
         raise OptionError(
             f"sub-polytopes are those of a parallel set, this one is {grasp_set.kind}: "
@@ -157,6 +158,7 @@ def plot_contact_space(
     OptionError
         If the axes have depth for two fingers, or none for three.
     """
+    check_drawable(grasp_set)
     lengths = grasp_set.torque.lengths[0]
     bodies = [body(grasp_set, sign) for sign in (1, -1)]
     colors = palette.BLUE, palette.VERMILLION
@@ -223,6 +225,8 @@ def plot_projections(
         If a set has no contacts on these edges, their number is not 1 or 2, the sets are not of
         one object, or the axes have depth.
     """
+    check_drawable(first)
+    check_drawable(second)
     held = np.atleast_1d(on).tolist()
     if len(held) not in (1, 2):
         raise OptionError(f"projections are drawn on 1 or 2 held edges, got {len(held)}: {held}")

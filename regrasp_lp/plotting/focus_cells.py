@@ -24,7 +24,7 @@ from regrasp_lp.grasp_sets.parallel import common_cone_rays
 from regrasp_lp.linear_sets import LinearSets
 from regrasp_lp.lp import get_solver, maximise_margins
 from regrasp_lp.plotting import palette
-from regrasp_lp.plotting.frame import Drawing
+from regrasp_lp.plotting.frame import Drawing, check_drawable
 from regrasp_lp.plotting.grasps import pie
 from regrasp_lp.plotting.scene import (
     CONE,
@@ -139,6 +139,7 @@ def plot_focus_cell(
     >>> sorted(plot_focus_cell(graph.sets[0]).regions)
     [0, 1, 2]
     """
+    check_drawable(grasp_set)
     cell, polygon = cell_of(grasp_set), grasp_set.polygon
     if literal and len(grasp_set.edges) != 2:
         raise OptionError(f"literal=True is for two-finger sets; this one is {grasp_set.kind}")

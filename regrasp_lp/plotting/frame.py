@@ -12,7 +12,9 @@ from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure, SubFigure
 from matplotlib.transforms import ScaledTranslation, Transform
 
+from regrasp_lp.errors import OptionError
 from regrasp_lp.friction import FloatArray
+from regrasp_lp.grasp_sets.grasp_set import GraspSet
 from regrasp_lp.plotting.palette import MARGIN
 
 POINTS_PER_INCH = 72.0
@@ -29,6 +31,16 @@ class OwnFigure(Figure):
         data = io.BytesIO()
         self.savefig(data, format="png")
         return data.getvalue()
+
+
+def check_drawable(grasp_set: GraspSet) -> None:
+    """Raise OptionError for a set that limits of a hand cut: its pictures know whole edges only."""
+    cones = grasp_set.torque.cones
+    if grasp_set.limited is not None or cones.whole is not cones:
+        raise OptionError(
+            "pictures of grasp sets are for hands without limits: draw the set of the same edges "
+            f"{grasp_set.edges} in a graph that was built without them"
+        )
 
 
 @dataclass(frozen=True, eq=False, repr=False)

@@ -120,20 +120,20 @@ def plot_graph(
 
 def _listed(graph: SwitchingGraph) -> IntArray:
     """The pairs of sets that have to hold contacts in common and can, shape (K, 2)."""
-    need, contacts = graph.hand.needs, graph.sets.contacts
+    adjacent, contacts = graph.hand.adjacent, graph.sets.contacts
     chunks = [np.zeros((0, 2), dtype=np.intp)]
     for pairs in graph.switches.pairs():
         i, j = pairs.first, pairs.second
-        holds = need[contacts[i], contacts[j]] > 0
+        holds = ~adjacent[contacts[i], contacts[j]]
         chunks.append(np.unique(np.stack((i[holds], j[holds]), axis=1), axis=0))
     return np.asarray(np.unique(np.concatenate(chunks), axis=0))
 
 
 def _implicit(graph: SwitchingGraph) -> IntArray:
     """The pairs that need to hold nothing, shape (K, 2); none if they are too many to draw."""
-    need, contacts = graph.hand.needs, graph.sets.contacts
+    adjacent, contacts = graph.hand.adjacent, graph.sets.contacts
     of = {m: np.flatnonzero(contacts == m) for m in (2, 3)}
-    free = [(n, m) for n, m in ((2, 2), (2, 3), (3, 3)) if need[n, m] == 0]
+    free = [(n, m) for n, m in ((2, 2), (2, 3), (3, 3)) if adjacent[n, m]]
     count = sum(
         len(of[n]) * (len(of[m]) - 1) // 2 if n == m else len(of[n]) * len(of[m]) for n, m in free
     )
@@ -145,8 +145,8 @@ def _implicit(graph: SwitchingGraph) -> IntArray:
 
 def _joined_to_all(graph: SwitchingGraph) -> BoolArray:
     """Which sets are adjacent to all of some number of contacts, shape (N,)."""
-    need, contacts = graph.hand.needs, graph.sets.contacts
-    return np.asarray((need[contacts][:, np.unique(contacts)] == 0).any(axis=1))
+    adjacent, contacts = graph.hand.adjacent, graph.sets.contacts
+    return np.asarray(adjacent[contacts][:, np.unique(contacts)].any(axis=1))
 
 
 # --- layout -------------------------------------------------------------------------------------

@@ -22,7 +22,7 @@ from regrasp_lp.grasp_sets.collection import GraspSet
 from regrasp_lp.grasp_sets.sweeps import Sweeps
 from regrasp_lp.linear_sets import LinearSets
 from regrasp_lp.plotting import palette
-from regrasp_lp.plotting.frame import Drawing
+from regrasp_lp.plotting.frame import Drawing, check_drawable
 from regrasp_lp.plotting.grasps import FORCE, draw_line, pie
 from regrasp_lp.plotting.scene import (
     CONE,
@@ -152,6 +152,7 @@ def plot_common_cone(
     >>> sorted(plot_common_cone(graph.sets[-1]).contacts) == list(graph.sets[-1].edges)
     True
     """
+    check_drawable(grasp_set)
     center, rays = common_cone_of(grasp_set)
     grasp = grasp_set.witness if grasp is None else grasp
     if grasp not in grasp_set:
@@ -208,6 +209,7 @@ def plot_union_volume(
     OptionError
         If this is no parallel set.
     """
+    check_drawable(grasp_set)
     center, _ = common_cone_of(grasp_set)
     signs = _volume_signs() if key else []
     scene = set_scene(grasp_set.polygon, grasp_set.edges, _view(grasp_set), ax, signs)

@@ -8,7 +8,7 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 
-from bench import clocks, gcs, growth, one_by_one, planning, ratio, subjects, where
+from bench import clocks, gcs, growth, one_by_one, planning, queries, ratio, subjects, where
 from bench.growth import Growth
 from bench.ratio import Meeting
 from bench.report import Table, machine
@@ -16,6 +16,9 @@ from regrasp_lp.files import write_atomically
 
 COMPLETE_GROWTH_UP_TO = 100
 """Edges of the largest complete graph that is grown without --all: larger ones take minutes."""
+
+QUERIES = 100
+"""Random pairs of grasps for each objective on a graph that is built."""
 
 _INTRODUCTION = """\
 # Benchmarks
@@ -82,6 +85,15 @@ def run_planning(options: argparse.Namespace, results: Results) -> None:
     results.add(planning.measure_small(small, pairs, min(options.repeats, 3)))
 
 
+def run_queries(options: argparse.Namespace, results: Results) -> None:
+    built, others = (3, 1) if options.quick else (QUERIES, options.pairs)
+    results.add(queries.built_table(subjects.graphs_to_ask(options.quick), built))
+    large = subjects.large_outlines(options.quick, least=230)
+    results.add(queries.direct_table(large, others))
+    small = subjects.small_outlines(options.quick)
+    results.add(queries.corpus_table(small, min(others, 2)))
+
+
 def run_gcs(options: argparse.Namespace, results: Results) -> None:
     if importlib.util.find_spec("gcsopt") is None:
         results.add(gcs.missing())
@@ -96,6 +108,7 @@ PARTS: dict[str, Callable[[argparse.Namespace, Results], None]] = {
     "growth": run_growth,
     "checks": run_checks,
     "planning": run_planning,
+    "queries": run_queries,
     "gcs": run_gcs,
 }
 
@@ -104,7 +117,7 @@ def parser() -> argparse.ArgumentParser:
     result = argparse.ArgumentParser(
         prog="python tests/bench",
         description="Measure the package: against the chapter's method on GEOS, where its time "
-        "goes, growth, one LP at a time, planning without the graph, and gcsopt.",
+        "goes, growth, one LP at a time, planning without the graph, queries, and gcsopt.",
         epilog="Needs the extras of the tests (pip install -e '.[test]'). Takes about a quarter "
         "of an hour; leave the machine alone meanwhile. Outlines of a corpus are planned on if "
         "REGRASP_LP_CORPUS names its folder.",

@@ -57,22 +57,41 @@ def small_objects(quick: bool) -> list[rl.Polygon]:
     ]
 
 
-def large_outlines(quick: bool) -> list[rl.Polygon]:
-    """A generated star of 400 edges, and the outlines of 291 to 400 edges of the corpus if any.
+def large_outlines(quick: bool, least: int = 291) -> list[rl.Polygon]:
+    """A generated star of 400 edges, and outlines of so many to 400 edges of the corpus if any."""
+    if quick:
+        return [star_polygon(20, seed=0)]
+    return [star_polygon(400, seed=0), *corpus(least, 400)]
+
+
+def corpus(least: int, most: int) -> list[rl.Polygon]:
+    """The outlines of so many edges of the corpus, by their number of edges; none without it.
 
     The corpus is in the folder that REGRASP_LP_CORPUS names, by default ``../shared/corpus``.
     """
-    if quick:
-        return [star_polygon(20, seed=0)]
     default = REPOSITORY.parent / "shared" / "corpus"
     folder = Path(os.environ.get("REGRASP_LP_CORPUS", default))
     found = [
         polygon
         for file in sorted(folder.glob("*.geojson"))
         for polygon in rl.read_polygons(file)
-        if 291 <= polygon.n_edges <= 400
+        if least <= polygon.n_edges <= most
     ]
-    return [star_polygon(400, seed=0), *sorted(found, key=lambda polygon: polygon.n_edges)]
+    return sorted(found, key=lambda polygon: polygon.n_edges)
+
+
+def graphs_to_ask(quick: bool) -> list[rl.Polygon]:
+    """Objects whose graphs are built and then asked: two of 40 edges."""
+    names = ("star_15",) if quick else ("star_40", "concave_40")
+    return [models()[name] for name in names]
+
+
+def small_outlines(quick: bool) -> list[rl.Polygon]:
+    """The outlines of the corpus of up to 64 edges; our own workpieces if there is none."""
+    parts = rl.read_polygons(REPOSITORY / "models" / "workpieces.geojson")
+    if quick:
+        return [part for part in parts if part.n_edges <= 8][:3]
+    return corpus(3, 64) or [part for part in parts if part.n_edges <= 64]
 
 
 def random_grasps(
