@@ -34,9 +34,9 @@ def plan_with_chain(
 ) -> tuple[rl.Plan, Chain]:
     seen: dict[str, Any] = {}
 
-    def build(stages: Any, held: Any, f: Any, g: Any) -> PathProblem:
+    def build(stages: Any, held: Any, f: Any, g: Any, couplings: Any) -> PathProblem:
         seen.update(stages=list(stages), held=[list(h) for h in held], start=f, goal=g)
-        seen["problem"] = path_lp.build_path_problem(stages, held, f, g)
+        seen["problem"] = path_lp.build_path_problem(stages, held, f, g, couplings=couplings)
         return seen["problem"]
 
     def solve(problem: PathProblem, solver: str) -> Any:

@@ -156,7 +156,7 @@ class Search:
     moves: Moves
     starts: Sequence[Support]
     goals: Sequence[Support]
-    patience: int = 4000
+    patience: int = 1200
     back: Moves | None = None
     reached: dict[Node, _Step] = field(default_factory=dict)
     exhausted: bool = False

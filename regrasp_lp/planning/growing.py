@@ -22,7 +22,9 @@ class GrowingMoves:
     """Switches between complete sets of a hand of four fingers, made when they are asked for.
 
     Whatever contains a force-closure grasp is in force closure, with no smaller margin: so between
-    the given grasps three-finger sets are enough, and switches that hold two contacts.
+    the given grasps three-finger sets are enough, and switches that hold two contacts. The same is
+    true of tolerances where all contacts keep away from the ends of their edges; given ones need
+    not, so that from these there are switches to two-finger sets, too.
 
     Parameters
     ----------
@@ -45,7 +47,8 @@ class GrowingMoves:
     def of(self, index: int) -> list[Contacts]:
         """Return the choices of held contacts from one set, by their number, most first."""
         if index not in self._known:
-            found = self._from_two(index) if self.rows.contacts[index] == 2 else []
+            two = self.rows.contacts[index] == 2
+            found = self._from_two(index) if two else self._from_three(index)
             self._known[index] = [c for c in found or [self._thirds(index)] if len(c.others)]
         return self._known[index]
 
@@ -73,6 +76,13 @@ class GrowingMoves:
         others = np.concatenate((self._sets(np.concatenate(triples)), pairs))
         single = common_contacts(self.rows.edges, index, others, 1)
         return [self._thirds(index), single, Contacts.free(pairs)]
+
+    def _from_three(self, index: int) -> list[Contacts]:
+        """Switches from three given contacts of which some may be near the ends of their edges."""
+        if index >= self._given or self.rows.measure == "margin":
+            return []
+        pairs = self._sets(two_finger_candidates(self.cones))
+        return [self._thirds(index), common_contacts(self.rows.edges, index, pairs, 1)]
 
     def _sets(self, combinations: IntArray) -> IntArray:
         """The numbers of those of some combinations that exist; new ones are added."""

@@ -39,7 +39,7 @@ from regrasp_lp.torque import torque_functions
 _WHOLE = 64
 """Up to so many edges all of them are taken."""
 
-_SOME = (24, 40)
+_SOME = (24, 52)
 """Otherwise so many, one number after the other."""
 
 _PATIENCE = 25

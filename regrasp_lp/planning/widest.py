@@ -32,6 +32,9 @@ _NEARLY_TOGETHER = 1e-6
 _ACCURATE = 1e-7
 """Of the optimum: levels that differ by less are not told apart."""
 
+_PATIENT = 3
+"""How many searches may be given up before the best so far is taken, with a gap."""
+
 _LEAST = 1e-6
 """Of the object's size: levels below are not searched for, and the optimum is only bounded."""
 
@@ -85,7 +88,7 @@ class WidestProblem:
     solver: Solver
     starts: Sequence[Support]
     goals: Sequence[Support]
-    patience: int = 4000
+    patience: int = 1200
     back: Moves | None = None
     limit: float = np.inf
     _cuts: dict[float, Cut] = field(default_factory=dict)
@@ -111,7 +114,7 @@ class WidestProblem:
         bound = min(self.cap, self.limit)
         accuracy = self._accuracy(bound)
         best: Route | None = None
-        level, proved, searches = 0.0, True, 0
+        level, given_up, searches = 0.0, 0, 0
         # At the bound itself, where most optima are; then in the middle of what is left, and just
         # above the best level so far, in turns.
         trial = bound
@@ -125,12 +128,12 @@ class WidestProblem:
                 bound = min(bound, trial)
                 accuracy = self._accuracy(bound)
             else:
-                proved = False
-            if not proved and searches > 12:
+                given_up += 1
+            if given_up == _PATIENT:
                 break
             middle = (level + bound) / 2
             trial = middle if searches % 2 else min(level + accuracy, bound)
-            if not proved:
+            if given_up:  # neither yes nor no: a lower level may be easier
                 trial = (level + trial) / 2
         return Widest(best, level if best is not None else -np.inf, max(bound, level), searches)
 
