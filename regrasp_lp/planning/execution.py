@@ -117,6 +117,33 @@ class Execution:
         for finger in leaving:
             self._do(Release(finger))
 
+    def along(
+        self,
+        path: Sequence[int],
+        held: Sequence[Sequence[tuple[int, int]]],
+        grasps: Sequence[Sequence[FloatArray] | FloatArray],
+        goal: Grasp,
+    ) -> None:
+        """Slide and switch through grasps of a path of sets, to a goal that the last one holds.
+
+        Parameters
+        ----------
+        path : sequence of int
+            The sets; the first is the current one.
+        held : sequence of sequence of (int, int)
+            Per switch the held contacts.
+        grasps : sequence of sequence of numpy.ndarray
+            Per set the fractions of its grasps, from arriving to leaving.
+        goal : Grasp
+        """
+        self.release_others()
+        for t, (index, nodes) in enumerate(zip(path, grasps, strict=True)):
+            if t:
+                self.switch(index, held[t - 1], nodes[0])
+            for node in nodes[1:]:
+                self.slide(node)
+        self.place_others(goal)
+
     def place_others(self, goal: Grasp) -> None:
         """Place the contacts of the goal that are not part of the last set's grasp."""
         there = set(self._touching.values())

@@ -201,12 +201,6 @@ class PathSet(PathModel):
         goal = last if steps.goal is None else steps.goal.grasp
         fingers = {i + 1: contact for i, contact in enumerate(start)}
         run = Execution(sets, self.hand, fingers, [i + 1 for i in chosen], self.nodes[0], given)
-        run.release_others()
-        for t, (index, nodes) in enumerate(zip(self.nodes, grasps, strict=True)):
-            if t:
-                run.switch(index, steps.choice.held[t - 1], nodes[0])
-            for node in nodes[1:]:
-                run.slide(node)
-        run.place_others(goal)
+        run.along(self.nodes, steps.choice.held, grasps, goal)
         done = tuple(run.steps), tuple(run.supports)
         return Plan(sets.polygon, self.friction, self.hand, fingers, goal, *done)

@@ -75,13 +75,7 @@ def perform(
         for stop in _stops(problem, passage, start, goal):
             run.hop(stop)
     else:
-        run.release_others()
-        for t, (index, nodes) in enumerate(zip(passage.path, passage.grasps, strict=True)):
-            if t:
-                run.switch(index, passage.held[t - 1], nodes[0])
-            for node in nodes[1:]:
-                run.slide(node)
-        run.place_others(goal)
+        run.along(passage.path, passage.held, passage.grasps, goal)
     return _verified(problem, run, fingers, goal)
 
 
