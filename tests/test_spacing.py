@@ -367,6 +367,7 @@ def test_vacuous_limits(polygon: rl.Polygon, friction: float, fingers: int) -> N
         assert limited.neighbors(i) == free.neighbors(i)
 
 
+@pytest.mark.slow
 @given(stars(), st.sampled_from([0.3, 0.7, 1.0]), st.floats(0.3, 0.9), st.floats(0.3, 0.9))
 @settings(max_examples=8)
 def test_tighter_limits_leave_less(
