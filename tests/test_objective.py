@@ -129,3 +129,19 @@ def test_travel_within_rounding_of_none_is_none() -> None:
 @pytest.mark.parametrize(("name", "bound"), [("travel", -np.inf), ("margin", np.inf)])
 def test_what_is_not_bounded_has_no_proof(name: str, bound: float) -> None:
     assert Objective.of(name).gap(1.0, bound) == np.inf
+
+
+def test_failures_of_all_plans_are_no_proof_that_there_is_none(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    from regrasp_lp.planning import planner
+
+    def fail(*_: object, **__: object) -> None:
+        raise rl.SolverError("not within its accuracy")
+
+    graph = rl.build_switching_graph(rectangle(), 0.4)
+    ends = [(0, 2.0), (2, 2.0)], [(1, 1.0), (3, 1.0)]
+    monkeypatch.setattr(planner, "perform", fail)
+    for objective in ("travel", {"placements": 1, "travel": 0.1}, "margin", "placements"):
+        with pytest.raises(rl.SolverError, match="accuracy"):
+            graph.plan(*ends, objective=objective)

@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
+import logging
 from collections.abc import Iterator
-from contextlib import suppress
+from contextlib import contextmanager
 from dataclasses import dataclass, replace
 from functools import cached_property, partial
 from itertools import islice, pairwise
@@ -39,6 +40,8 @@ from regrasp_lp.planning.widest import Widest, WidestProblem
 from regrasp_lp.planning.widest_routes import WidestRoutes
 from regrasp_lp.switches import Switches
 from regrasp_lp.torque import torque_functions
+
+_LOG = logging.getLogger("regrasp_lp")
 
 _MANY, _FEW = 3000, 400
 """How many programs a search for the least cost may take, fewer if only placements can fall."""
@@ -238,12 +241,13 @@ class PlanningProblem:
             return [replace(plan, objective=objective, bound=None) for plan in fewest]
         starts = [replace(end, placed=0) for end in self._terminals(start)]
         plans: list[Plan] = []
+        failures: list[SolverError | NoPlanFound] = []
         for how in dict.fromkeys((aligning, "regrip" if objective.name == "travel" else aligning)):
-            with suppress(SolverError, NoPlanFound):
+            with _noting(failures):
                 plans += islice(self._fewest(start, goal, how, steering), 1)
         best = min((objective.value(plan) for plan in plans), default=np.inf)
         found, bound = None, 0.0 if objective.name == "travel" else -np.inf
-        with suppress(SolverError):  # no route within the budget
+        with _noting(failures):  # there may be no route within the budget
             found = shortest_route(
                 self.sets,
                 remembered(self.switches),
@@ -258,9 +262,11 @@ class PlanningProblem:
         if found is not None and aligning == "slide":
             chosen = self.sets.holding(start)[found.route.origin][1]
             passage = Passage(found.path, found.held, tuple(found.grasps), chosen)
-            with suppress(SolverError, NoPlanFound):
+            with _noting(failures):
                 plans.append(perform(self, passage, start, goal, aligning))
         if not plans:
+            if failures:  # neither a plan nor the proof that there is none
+                raise failures[0]
             return []
         rounding = _THIN * self.sets.polygon.diameter
         plans.sort(key=lambda p: (np.round(objective.value(p) / rounding), p.placements))
@@ -305,7 +311,7 @@ class PlanningProblem:
         plans = []
         if found.route is not None:
             # Within rounding of its bound, or not without sliding: another plan may do.
-            with suppress(SolverError, NoPlanFound):
+            with _noting([]):
                 plans.append(self._on_route(found.route, grasps, start, goal, aligning))
         if not plans or objective.gap(objective.value(plans[0]), found.bound) > 0:
             plans += islice(self._fewest(start, goal, aligning, steering), 1)
@@ -377,3 +383,15 @@ class PlanningProblem:
         names = tuple(f"x{i}" for i in range(n))
         free = LinearSets(names, none, none[:, :, 0], none[:, :, 0], box, box + 1.0)
         return with_rows(free, rows, bounds, "tolerance")
+
+
+@contextmanager
+def _noting(failures: list[SolverError | NoPlanFound]) -> Iterator[None]:
+    """Keep what goes wrong with one plan where another may do; a solver's failure is logged."""
+    try:
+        yield
+    except SolverError as failure:
+        _LOG.warning("one plan is left out: %s", failure)
+        failures.append(failure)
+    except NoPlanFound as refusal:
+        failures.append(refusal)
