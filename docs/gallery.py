@@ -1,61 +1,57 @@
-"""Write the pictures of the README to docs/images.
+"""Write the pictures of the documentation, and its live pages, to docs/images and docs/static.
 
     python docs/gallery.py [FOLDER]
 
-Needs the extra "plot". The plan at the top of the README is that of its first command.
+Needs the extra "plot". A picture of a page is what the page's own examples save under its name;
+those of the theory are in `theory_figures`. The plan at the top of the README is that of its first
+command.
 """
 
 from __future__ import annotations
 
-import math
+import os
+import re
+import shutil
 import sys
+import tempfile
 from pathlib import Path
 
-import regrasp_lp as rl
-from regrasp_lp import plotting
+import matplotlib
+import snippets
+from theory_figures import FIGURES
 
-REPOSITORY = Path(__file__).resolve().parent.parent
-MU = math.tan(math.radians(10))
-
-
-def model(file: str, name: str) -> rl.Polygon:
-    """Return a polygon of `models`."""
-    polygons = rl.read_polygons(REPOSITORY / "models" / f"{file}.geojson")
-    return next(polygon for polygon in polygons if polygon.name == name)
+DOCS = Path(__file__).resolve().parent
+SHOWN = re.compile(r"\]\((?:\.\./)?(images|static)/([\w-]+\.(?:png|gif|html))\)")
 
 
-def widest(graph: rl.SwitchingGraph, kind: str) -> list[int]:
-    """Return the numbers of the sets of a kind, that with the largest margin first."""
-    numbers = (i for i, grasp_set in enumerate(graph.sets) if grasp_set.kind == kind)
-    return sorted(numbers, key=lambda i: -graph.sets[i].margin)
+def drawn_by(page: Path) -> dict[str, str]:
+    """Return what a page shows and its own examples save: names of files, and their folders."""
+    code = "".join(example.code for example in snippets.examples(page))
+    shown = SHOWN.findall(page.read_text(encoding="utf-8"))
+    return {name: folder for folder, name in shown if f'"{name}"' in code}
 
 
-def pictures() -> dict[str, plotting.Drawing]:
-    """Return the pictures by the names of their files."""
-    gusset = model("machine_parts", "gusset")
-    graph = rl.build_switching_graph(gusset, MU, sets="chapter", switching="focus")
-    star = rl.build_switching_graph(
-        model("stars", "star_25"), MU, sets="chapter", switching="focus"
-    )
-    concurrent = widest(graph, "concurrent")[0]
-    sets = graph.sets
-    (leave,), (come,) = sets.on_edges((0, 2, 6)), sets.on_edges((0, 3))
-    return {
-        "focus_cell": plotting.plot_focus_cell(sets[concurrent]),
-        "focus_switch": plotting.plot_focus_switch(graph, leave, come),
-        "common_cone": plotting.plot_common_cone(sets[widest(graph, "parallel")[0]]),
-        "candidates": plotting.plot_candidates(
-            gusset, MU, "concurrent", sets[concurrent].edges[:2]
-        ),
-        "contact_space": plotting.plot_contact_space(sets[concurrent]),
-        "graph": plotting.plot_graph(star),
-    }
+def draw(page: Path, target: Path) -> None:
+    """Run the examples of a page and keep its pictures."""
+    with tempfile.TemporaryDirectory() as scratch:
+        os.symlink(DOCS.parent / "models", Path(scratch) / "models")
+        os.chdir(scratch)
+        snippets.run(page)
+        for name, folder in drawn_by(page).items():
+            shutil.copy(name, target / folder / name)
+        os.chdir(DOCS)
 
 
-def main(folder: Path = REPOSITORY / "docs" / "images") -> None:
-    """Write all pictures to a folder."""
-    for name, picture in pictures().items():
-        picture.figure.savefig(folder / f"{name}.png", dpi=110)
+def main(target: Path = DOCS) -> None:
+    """Write all pictures to the folders `images` and `static` of a folder."""
+    target = target.resolve()
+    matplotlib.use("Agg")
+    matplotlib.rcParams["savefig.dpi"] = 110
+    for page in sorted(DOCS.rglob("*.md")):
+        if drawn_by(page):
+            draw(page, target)
+    for name, figure in FIGURES.items():
+        figure().savefig(target / "images" / f"{name}.png")
 
 
 if __name__ == "__main__":

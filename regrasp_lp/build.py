@@ -245,6 +245,13 @@ def plan_regrasp(
     ------
     NoPlanFound, NotForceClosureError, ContactError, HandError, OptionError, SolverError
         As for `SwitchingGraph.plan`.
+
+    Examples
+    --------
+    >>> block = Polygon([(0, 0), (6, 0), (6, 3), (0, 3)], name="block")
+    >>> plan = plan_regrasp(block, [(0, 3), (2, 3)], [(1, 1.5), (3, 1.5)], friction=0.4)
+    >>> [type(step).__name__ for step in plan.steps]
+    ['Place', 'Place', 'Release', 'Release']
     """
     check_aligning(aligning)
     aim = Objective.of(objective)

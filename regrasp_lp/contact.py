@@ -8,12 +8,13 @@ from __future__ import annotations
 import math
 import numbers
 from collections.abc import Iterable, Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import TypeVar, cast
 
 import numpy as np
 import numpy.typing as npt
 
+from regrasp_lp.display import grasp_html
 from regrasp_lp.errors import ContactError
 
 __all__ = ["FRACTION_SNAP", "Contact", "Grasp", "as_contact", "snap_fraction"]
@@ -97,15 +98,20 @@ class Grasp:
     ----------
     contacts : iterable of Contact or (edge, position)
         The contacts; pairs give distances along the edges in the polygon's unit.
+    fingers : sequence of int, optional
+        Which finger is at each contact, numbered from 1; only the start of a plan asks for it, and
+        takes fingers 1, 2, ... by default. Grasps are equal if their contacts are.
 
     Attributes
     ----------
     contacts : tuple of Contact
+    fingers : tuple of int or None
 
     Raises
     ------
     ContactError
-        If an entry is neither a `Contact` nor a valid pair.
+        If an entry is neither a `Contact` nor a valid pair, or there are not as many different
+        fingers as contacts.
 
     Examples
     --------
@@ -119,19 +125,30 @@ class Grasp:
     """
 
     contacts: tuple[Contact, ...]
+    fingers: tuple[int, ...] | None = field(default=None, compare=False)
 
-    def __init__(self, contacts: Iterable[Contact | tuple[int, float]]) -> None:
+    def __init__(
+        self,
+        contacts: Iterable[Contact | tuple[int, float]],
+        fingers: Iterable[int] | None = None,
+    ) -> None:
         if isinstance(contacts, Contact) or not isinstance(contacts, Iterable):
             raise ContactError(
                 f"a grasp is made from an iterable of contacts or (edge, position) pairs, "
                 f"not from {contacts!r}"
             )
+        if fingers is None and isinstance(contacts, Grasp):
+            fingers = contacts.fingers
         object.__setattr__(self, "contacts", tuple(as_contact(c) for c in contacts))
+        named = None if fingers is None else _different_fingers(fingers, len(self.contacts))
+        object.__setattr__(self, "fingers", named)
 
     @classmethod
-    def at_fractions(cls, pairs: Iterable[tuple[int, float]]) -> Grasp:
+    def at_fractions(
+        cls, pairs: Iterable[tuple[int, float]], fingers: Iterable[int] | None = None
+    ) -> Grasp:
         """Return the grasp with contacts at (edge, fraction), fractions in [0, 1]."""
-        return cls([Contact.at_fraction(*_pair(pair, "fraction")) for pair in pairs])
+        return cls([Contact.at_fraction(*_pair(pair, "fraction")) for pair in pairs], fingers)
 
     @property
     def edges(self) -> npt.NDArray[np.intp]:
@@ -179,11 +196,15 @@ class Grasp:
         return self.contacts[index]
 
     def __repr__(self) -> str:
+        named = "" if self.fingers is None else f", fingers={self.fingers}"
         if self.contacts and all(c.fraction is not None for c in self.contacts):
-            return f"Grasp.at_fractions({[(c.edge, c.fraction) for c in self.contacts]})"
+            return f"Grasp.at_fractions({[(c.edge, c.fraction) for c in self.contacts]}{named})"
         if all(c.fraction is None for c in self.contacts):
-            return f"Grasp({[(c.edge, c.position) for c in self.contacts]})"
-        return f"Grasp({list(self.contacts)})"
+            return f"Grasp({[(c.edge, c.position) for c in self.contacts]}{named})"
+        return f"Grasp({list(self.contacts)}{named})"
+
+    def _repr_html_(self) -> str:
+        return grasp_html(self)
 
 
 def as_contact(value: object) -> Contact:
@@ -216,6 +237,27 @@ def snap_fraction(fraction: float) -> float | None:
     return fraction if 0.0 < fraction < 1.0 else None
 
 
+def as_points(points: npt.ArrayLike) -> npt.NDArray[np.float64]:
+    """Return points to snap as an array (m, 2).
+
+    Raises
+    ------
+    ContactError
+        If they are no finite numbers of that shape.
+    """
+    expected = "points to snap have to be finite numbers of shape (m, 2), one (x, y) a row"
+    try:
+        array = np.asarray(points)
+    except ValueError:
+        raise ContactError(f"{expected}; they are ragged") from None
+    if array.dtype.kind not in "fiu" or array.ndim != 2 or array.shape[1] != 2:
+        raise ContactError(f"{expected}; got {array.dtype} of shape {array.shape}")
+    array = array.astype(np.float64)
+    if not np.isfinite(array).all():
+        raise ContactError(f"{expected}; got {array[~np.isfinite(array).all(axis=1)][0].tolist()}")
+    return array
+
+
 def _pair(value: object, what: str) -> tuple[int, float]:
     """Take (edge, number) apart; the entries are checked by `Contact`."""
     if isinstance(value, Iterable) and not isinstance(value, (str, bytes)):
@@ -223,6 +265,17 @@ def _pair(value: object, what: str) -> tuple[int, float]:
         if len(entries) == 2 and None not in entries:
             return cast("tuple[int, float]", (entries[0], entries[1]))
     raise ContactError(f"expected a Contact or a pair (edge, {what}), got {value!r}")
+
+
+def _different_fingers(fingers: Iterable[int], count: int) -> tuple[int, ...]:
+    named = tuple(fingers)
+    whole = all(isinstance(k, numbers.Integral) and not isinstance(k, bool) for k in named)
+    if not whole or len(named) != count or len(set(named)) < count or min(named, default=1) < 1:
+        raise ContactError(
+            f"the fingers of a grasp are {count} different numbers from 1, one for each contact, "
+            f"not {list(named)}"
+        )
+    return tuple(int(k) for k in named)
 
 
 def _edge_number(edge: object) -> int:

@@ -273,6 +273,7 @@ def coupled_rule(
         else:
             result.exist[:] = True
         result.exist[_disjoint(sets, first.take(i), second.take(j))] = False
+        result.exist[_too_many(sets, first.take(i), second.take(j))] = False
         for start in range(0, len(i), _CHUNK):
             rows = start + np.flatnonzero(result.exist[start : start + _CHUNK])
             one, other = first.take(i[rows]), second.take(j[rows])
@@ -302,6 +303,27 @@ def _disjoint(sets: GraspSets, first: Shadows, second: Shadows) -> BoolArray:
         same &= family.centers[one] == family.centers[other]
         result[mine] = same & (first.held == family.functions.m)
     return np.asarray(result)
+
+
+def _too_many(sets: GraspSets, first: Shadows, second: Shadows) -> BoolArray:
+    """Whether switches need more fingers than the hand has of those that may touch there."""
+    spacing = sets.spacing
+    assert spacing is not None
+    n = len(spacing.sizes)
+    if n < 2:
+        return np.zeros(len(first), dtype=bool)
+    needed = -_per_group(spacing, first.edges)
+    for shadow in (first, second):
+        for number, family in enumerate(sets.families):
+            mine = np.flatnonzero(shadow.source == number)
+            needed[mine] += _per_group(spacing, family.functions.edges[shadow.row[mine]])
+    return np.asarray((needed > spacing.sizes).any(axis=1))
+
+
+def _per_group(spacing: Spacing, segments: IntArray) -> IntArray:
+    """How many of some contacts are of each group of fingers, shape (N, groups)."""
+    group = spacing.cones.group[segments]
+    return np.stack([(group == g).sum(axis=1) for g in range(len(spacing.sizes))], axis=1)
 
 
 def _seen(sets: GraspSets, first: Shadows, second: Shadows, points: FloatArray) -> BoolArray:

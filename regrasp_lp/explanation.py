@@ -152,8 +152,8 @@ class Explanation:
 
     def _switch_text(self) -> str:
         near = self.nearest
-        if self.hand.spaced:
-            return "not looked for, as the hand limits the distances between its fingers"
+        if self.hand.coupled:
+            return "not looked for, as the hand has limits that tie its fingers to each other"
         if near is None:
             return "no two sets of theirs have the edges in common that would have to be held"
         one, other = (

@@ -1,4 +1,4 @@
-"""Files: polygons in (GeoJSON or WKT, told apart by content), text out.
+"""Files: polygons in (GeoJSON, WKT, DXF or SVG, told apart by content), text out.
 
 Writers replace a file in one step, so that no reader ever sees half of one.
 """
@@ -10,11 +10,15 @@ import json
 import os
 import secrets
 import shutil
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterable, Iterator, Mapping
 from pathlib import Path
 from typing import Any, NamedTuple
 
-from regrasp_lp.errors import FileFormatError, PolygonError
+from regrasp_lp.errors import FileFormatError, OptionError, PolygonError
+from regrasp_lp.outlines.drawing import Piece, Reading, outlines
+from regrasp_lp.outlines.dxf import looks_like_dxf, read_dxf
+from regrasp_lp.outlines.svg import read_svg
+from regrasp_lp.outlines.svg_elements import looks_like_svg
 from regrasp_lp.polygon import Polygon
 from regrasp_lp.wkt import looks_like_wkt, parse_wkt
 
@@ -29,26 +33,57 @@ class _Feature(NamedTuple):
     parts: list[list[Any]]
 
 
-def read_polygons(path: str | os.PathLike[str]) -> list[Polygon]:
-    """Return the polygons of a GeoJSON or WKT file, in the order of the file.
+def read_polygons(
+    path: str | os.PathLike[str],
+    *,
+    flattening: float | None = None,
+    joining: float | None = None,
+    layers: Iterable[str] | None = None,
+    ignore: Iterable[str] = (),
+) -> list[Polygon]:
+    """Return the polygons of a GeoJSON, WKT, DXF or SVG file, in the order of the file.
 
     GeoJSON may be a FeatureCollection, a Feature or a bare geometry; WKT one geometry or
     several after one another. Geometries are Polygon, MultiPolygon or GeometryCollection of
-    these. The content decides which of the two it is, not the name of the file.
+    these. The content decides which format it is, not the name of the file.
+
+    DXF needs the extra ``dxf``, SVG the extra ``svg``. Of a drawing closed curves are read, and
+    open ones that join end to end; a ring inside another one is a hole. Coordinates stay in the
+    unit of the drawing (of an SVG file its user unit), and the y axis of SVG, which points down,
+    is turned up. Rings are nowhere farther than `flattening` + `joining` from the curves, nor
+    these from them.
 
     Names come from a feature's ``properties.name``, else its ``id``, else the stem of the file
-    with the index of the feature, ``part_0``. Polygons of a feature with several of them get
-    its name with ``_0``, ``_1``...; a name that occurs again gets ``_2``, ``_3``...
+    with the index of the feature, ``part_0``; in DXF from the layer of the outline, if it is not
+    layer 0; in SVG from the id or Inkscape's label of the element. Polygons of a feature with
+    several of them get its name with ``_0``, ``_1``...; a name that occurs again gets ``_2``,
+    ``_3``...
 
     Parameters
     ----------
     path : str or path-like
+    flattening : float, optional
+        Largest distance between a curve and the chords in its place, in the unit of the drawing;
+        by default a thousandth of the diagonal of the drawing's bounding box.
+    joining : float, optional
+        Ends of curves that are not farther apart are joined; by default a millionth of it.
+    layers : iterable of str, optional
+        Read what is on these layers of a DXF drawing, or in groups of an SVG drawing with these
+        ids or labels; by default all that is shown.
+    ignore : iterable of str, optional
+        Types of DXF entities (``"TEXT"``) or tags of SVG elements (``"text"``) to leave out; a
+        drawing with others than outlines is refused, unless they are named here.
 
     Raises
     ------
     FileFormatError
-        If the file cannot be read, is neither GeoJSON nor WKT, holds no polygon or anything
-        that is no valid polygon; the message names the file and the feature.
+        If the file cannot be read, is of another format, holds no polygon or anything that is
+        no valid polygon; the message names the file and the feature, entity or element.
+    MissingExtraError
+        If the extra that the format needs is not installed.
+    OptionError
+        If an option has a value that makes no sense, there is no layer of that name, or layers
+        or kinds of entities are given for a format that has none.
 
     Examples
     --------
@@ -60,18 +95,15 @@ def read_polygons(path: str | os.PathLike[str]) -> list[Polygon]:
     [<Polygon 'parts_0': 3 edges>]
     """
     path = Path(path)
+    reading = Reading.of(flattening, joining, layers, ignore)
     try:
-        text = path.read_text(encoding="utf-8-sig")
+        polygons = _build(_read_features(path, reading), path.stem)
     except OSError as error:
         raise FileFormatError(f"{path}: cannot be read: {error.strerror or error}") from error
-    except UnicodeDecodeError as error:
-        raise FileFormatError(f"{path}: is no text in UTF-8 (byte {error.start})") from error
-    try:
-        polygons = _build(_features(text), path.stem)
     except RecursionError as error:
         raise FileFormatError(f"{path}: is nested too deeply to be read") from error
-    except FileFormatError as error:
-        raise FileFormatError(f"{path}: {error}") from error.__cause__
+    except (FileFormatError, OptionError) as error:
+        raise type(error)(f"{path}: {error}") from error.__cause__
     if not polygons:
         raise FileFormatError(f"{path}: holds no polygon")
     return polygons
@@ -119,6 +151,28 @@ def write_atomically(path: str | os.PathLike[str], content: str | bytes) -> None
         temporary.unlink(missing_ok=True)
 
 
+def _read_features(path: Path, reading: Reading) -> list[_Feature]:
+    data = path.read_bytes()
+    if looks_like_dxf(data):
+        return _drawn(read_dxf(path, reading), reading)
+    if looks_like_svg(data):
+        return _drawn(read_svg(data, reading), reading)
+    if reading.layers is not None or reading.ignore:
+        raise OptionError("is no drawing: layers and ignore are for DXF and SVG")
+    try:
+        return _features(data.decode("utf-8-sig"))
+    except UnicodeDecodeError as error:
+        raise FileFormatError(f"is no text in UTF-8 (byte {error.start})") from error
+
+
+def _drawn(pieces: list[Piece], reading: Reading) -> list[_Feature]:
+    try:
+        found = outlines(pieces, reading)
+    except PolygonError as error:
+        raise FileFormatError(str(error)) from error
+    return [_Feature(outline.entity, outline.name, [outline.rings]) for outline in found]
+
+
 def _features(text: str) -> list[_Feature]:
     start = text.lstrip()[:1]
     if start in ("{", "["):
@@ -128,7 +182,9 @@ def _features(text: str) -> list[_Feature]:
         return [_Feature(f"geometry {k}", None, parts) for k, parts in enumerate(geometries)]
     if not start:
         raise FileFormatError("is empty")
-    raise FileFormatError("is neither GeoJSON (which begins with '{') nor WKT (POLYGON...)")
+    raise FileFormatError(
+        "is neither GeoJSON (which begins with '{') nor WKT (POLYGON...), DXF (0, SECTION) or SVG"
+    )
 
 
 def _build(features: list[_Feature], stem: str) -> list[Polygon]:

@@ -106,6 +106,8 @@ class Cones:
         The edge of the object that each is a segment of.
     lower, upper : numpy.ndarray, shape (n,)
         The fractions of that edge at which it starts and ends: 0 and 1 of a whole edge.
+    group : numpy.ndarray of int, shape (n,)
+        Which fingers may touch it: 0 unless these differ (`Hand.groups`).
     whole_edges : Cones, optional
         Those of all edges of the object, if these are of segments.
 
@@ -121,6 +123,7 @@ class Cones:
     edge: IntArray
     lower: FloatArray
     upper: FloatArray
+    group: IntArray
     whole_edges: Cones | None = None
 
     @classmethod
@@ -144,9 +147,16 @@ class Cones:
             np.arange(n),
             np.zeros(n),
             np.ones(n),
+            np.zeros(n, dtype=np.intp),
         )
 
-    def touching(self, edge: IntArray, lower: FloatArray, upper: FloatArray) -> Cones:
+    def touching(
+        self,
+        edge: IntArray,
+        lower: FloatArray,
+        upper: FloatArray,
+        group: IntArray | None = None,
+    ) -> Cones:
         """Return the cones of segments of these edges, all that fingers may touch.
 
         Parameters
@@ -155,7 +165,9 @@ class Cones:
             Ascending.
         lower, upper : numpy.ndarray, shape (S,)
             Fractions of the edge, lower < upper, read as the rationals they are. Segments of one
-            edge ascend and have no point in common.
+            edge and group ascend and have no point in common.
+        group : numpy.ndarray of int, shape (S,), optional
+            Which fingers may touch each; all by default.
 
         Returns
         -------
@@ -165,7 +177,9 @@ class Cones:
         starts = self.starts[edge] + lower[:, None] * vectors
         ends = self.starts[edge] + upper[:, None] * vectors
         ends = np.where(upper[:, None] == 1, self.ends[edge], ends)
-        return Cones(starts, ends, self.friction[edge], edge, lower, upper, self)
+        if group is None:
+            group = np.zeros(len(edge), dtype=np.intp)
+        return Cones(starts, ends, self.friction[edge], edge, lower, upper, group, self)
 
     @property
     def whole(self) -> Cones:
@@ -269,12 +283,16 @@ class Cones:
         vectors, exact = whole.vectors[self.edge], whole.exact_vectors[self.edge]
         return Directions(vectors, exact, whole.exact_unit, across, along)
 
-    def places(self, edges: IntArray, fractions: FloatArray) -> tuple[IntArray, FloatArray]:
+    def places(
+        self, edges: IntArray, fractions: FloatArray, group: IntArray | None = None
+    ) -> tuple[IntArray, FloatArray]:
         """Return on which segments places on edges of the object are, decided exactly.
 
         Parameters
         ----------
         edges, fractions : numpy.ndarray, shape (K,)
+        group : numpy.ndarray of int, shape (K,), optional
+            Which fingers are there; any by default.
 
         Returns
         -------
@@ -285,7 +303,10 @@ class Cones:
             its end.
         """
         near = np.clip(fractions[:, None], self.lower, self.upper)
-        off = np.where(edges[:, None] == self.edge, np.abs(near - fractions[:, None]), np.inf)
+        here = edges[:, None] == self.edge
+        if group is not None:
+            here &= group[:, None] == self.group
+        off = np.where(here, np.abs(near - fractions[:, None]), np.inf)
         if not self.n_edges:
             return np.full(len(edges), -1), fractions
         every, segments = np.arange(len(edges)), off.argmin(axis=1)

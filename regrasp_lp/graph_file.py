@@ -117,6 +117,17 @@ def load_graph(path: str | Path) -> SwitchingGraph:
     ------
     FileFormatError
         If the file cannot be read, is damaged, of another format or of another version.
+
+    Examples
+    --------
+    >>> import tempfile
+    >>> from regrasp_lp import build_switching_graph
+    >>> square = Polygon([(0, 0), (1, 0), (1, 1), (0, 1)], name="square")
+    >>> graph = build_switching_graph(square, friction=0.5)
+    >>> with tempfile.TemporaryDirectory() as folder:
+    ...     graph.save(Path(folder) / "square.npz")
+    ...     load_graph(Path(folder) / "square.npz") == graph
+    True
     """
     try:
         content = Path(path).read_bytes()
@@ -171,13 +182,12 @@ def graph_from_bytes(
 def _graph(
     header: dict[str, Any], arrays: dict[str, np.ndarray], polygon: Polygon | None
 ) -> SwitchingGraph:
-    spaced = "max_span" in header["hand"] or "fingertip_separation" in header["hand"]
+    hand = Hand.from_document(header["hand"])
     kinds = kinds_of(header["options"]["sets"])
-    _check_names(set(arrays), kinds, header["stored"], PIECE_ARRAYS if spaced else ())
+    _check_names(set(arrays), kinds, header["stored"], PIECE_ARRAYS if hand.coupled else ())
     if polygon is None:
         rings = np.split(arrays["vertices"], np.cumsum(arrays["ring_sizes"])[:-1])
         polygon = Polygon(rings[0], rings[1:], header["name"])
-    hand = Hand.from_document(header["hand"])
     cones = hand_cones(polygon, arrays["friction"], hand)
     options = GraphOptions(**header["options"])
     get_solver(options.solver)
@@ -194,7 +204,7 @@ def _graph(
         switches = _stored(
             len(sets),
             StoredSwitches(*(arrays[f"switches.{name}"] for name in SWITCH_ARRAYS)),
-            0 if spaced else 1,
+            0 if hand.coupled else 1,
         )
     else:
         rule = switch_rule(

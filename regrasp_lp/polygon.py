@@ -18,7 +18,8 @@ from typing import Any, TypeAlias
 import numpy as np
 import numpy.typing as npt
 
-from regrasp_lp.contact import FRACTION_SNAP, Contact, Grasp, as_contact, snap_fraction
+from regrasp_lp.contact import FRACTION_SNAP, Contact, Grasp, as_contact, as_points, snap_fraction
+from regrasp_lp.display import Pictured
 from regrasp_lp.errors import ContactError, PolygonError
 from regrasp_lp.ring_checks import check_rings
 from regrasp_lp.rings import RingLike, doubled_area, exact_integers, orient_rings, read_rings
@@ -33,7 +34,7 @@ _TIE = 1e-12
 
 
 @dataclass(frozen=True, init=False, eq=False, repr=False)
-class Polygon:
+class Polygon(Pictured):
     """A simple polygon, with holes or without: an immutable, validated value.
 
     Validation is exact for the doubles given. Rings may be closed or not and may run either
@@ -223,8 +224,7 @@ class Polygon:
 
     def __repr__(self) -> str:
         name = f" {self.name!r}" if self.name else ""
-        n = len(self.holes)
-        holes = f", {n} hole{'s' * (n > 1)}" if n else ""
+        holes = f", {n} hole{'s' * (n > 1)}" if (n := len(self.holes)) else ""
         return f"<Polygon{name}: {self.n_edges} edges{holes}>"
 
     def plot(self, ax: Any = None) -> Any:
@@ -232,6 +232,18 @@ class Polygon:
         from regrasp_lp.plotting import plot_polygon
 
         return plot_polygon(self, ax)
+
+    def simplified(self, tolerance: float) -> Polygon:
+        """Return a polygon of fewer vertices within `tolerance` (`outlines.simplification`).
+
+        Examples
+        --------
+        >>> Polygon([(0, 0), (2, 0.1), (4, 0), (4, 3)]).simplified(0.1)
+        <Polygon: 3 edges>
+        """
+        from regrasp_lp.outlines.simplification import simplify
+
+        return simplify(self, tolerance)
 
     # --- contacts -------------------------------------------------------------------------------
 
@@ -297,7 +309,8 @@ class Polygon:
         >>> wedge.resolve(Grasp([(0, 1.0), (2, 2.5)])).fractions
         array([0.25, 0.5 ])
         """
-        return Grasp([self.resolve_contact(contact) for contact in Grasp(grasp)])
+        fingers = grasp.fingers if isinstance(grasp, Grasp) else None
+        return Grasp(map(self.resolve_contact, Grasp(grasp)), fingers)
 
     def resolve_contact(self, contact: Contact | tuple[int, float]) -> Contact:
         """Return the contact with both position and fraction = position / length.
@@ -363,7 +376,7 @@ the edge is 4.0 long, positions run from 0 to that
         >>> wedge.snap([(1.0, 1e-9), (4.0, 0.0)])
         Grasp.at_fractions([(0, 0.25), (0, 1.0)])
         """
-        given = _read_points(points)
+        given = as_points(points)
         a_number = isinstance(tolerance, Real) and not isinstance(tolerance, bool)
         if not a_number or not 0 <= tolerance < np.inf:
             raise ContactError(f"the tolerance has to be a length, not {tolerance!r}")
@@ -398,18 +411,3 @@ the edge is 4.0 long, positions run from 0 to that
 
 def _label(name: str) -> str:
     return f"polygon {name!r}" if name else "polygon"
-
-
-def _read_points(points: npt.ArrayLike) -> _Floats:
-    """Points to snap as an array (m, 2)."""
-    expected = "points to snap have to be finite numbers of shape (m, 2), one (x, y) a row"
-    try:
-        array = np.asarray(points)
-    except ValueError:
-        raise ContactError(f"{expected}; they are ragged") from None
-    if array.dtype.kind not in "fiu" or array.ndim != 2 or array.shape[1] != 2:
-        raise ContactError(f"{expected}; got {array.dtype} of shape {array.shape}")
-    array = array.astype(np.float64)
-    if not np.isfinite(array).all():
-        raise ContactError(f"{expected}; got {array[~np.isfinite(array).all(axis=1)][0].tolist()}")
-    return array

@@ -16,21 +16,27 @@ leave out has a contact at the end of its edge and another at the start of its o
 of a box is like that, and never the lower or the upper corner). Each function falls, or rises,
 piecewise linearly in t there, with a bend where a contact reaches the end of its edge, so that
 the least t is the larger one of the least root over the functions for D and of that for U.
+
+**A limited hand.** Contacts slide along what the hand may touch of their edges: along segments, for
+which all of this holds as for edges. What its limits to the distances between fingers leave is no
+box: they are checked of the grasps that are suggested.
 """
 
 from __future__ import annotations
 
 from collections.abc import Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from decimal import ROUND_CEILING, Context
 from fractions import Fraction
 
 import numpy as np
 
 from regrasp_lp.contact import Contact, Grasp
-from regrasp_lp.errors import ContactError
+from regrasp_lp.errors import ContactError, HandError
 from regrasp_lp.force_closure import is_force_closure, least_friction
-from regrasp_lp.friction import Cones, FloatArray
+from regrasp_lp.friction import FloatArray
+from regrasp_lp.planning.hand import Hand
+from regrasp_lp.planning.reach import hand_cones, within_reach
 from regrasp_lp.polygon import Polygon
 from regrasp_lp.torque import TorqueFunctions, torque_functions
 
@@ -57,11 +63,11 @@ class ContactMove:
     distance : float
         It has to move by more than this, in the object's unit (0: any move will do).
     interval : tuple of float
-        The positions between which it makes the grasp force closure; an end of the edge belongs
-        to them.
+        The positions between which it makes the grasp force closure; an end of the edge, or of
+        what the hand may touch of it, belongs to them.
     grasp : Grasp or None
-        The grasp with this contact a little beyond the threshold, in force closure exactly; None
-        if no double was found in the interval.
+        The grasp with this contact a little beyond the threshold, in force closure and within the
+        limits of the hand exactly; None if no double was found in the interval.
     """
 
     contact: int
@@ -95,7 +101,8 @@ class CommonMove:
         Every contact moves by no more than just above this, in the object's unit. With no larger
         moves than this there is no force closure.
     grasp : Grasp or None
-        A grasp a little farther away, in force closure exactly; None if no double was found.
+        A grasp a little farther away, in force closure and within the limits of the hand exactly;
+        None if no double was found.
     """
 
     distance: float
@@ -121,24 +128,31 @@ class Remedy:
     together : CommonMove or None
         The least bound on the moves of all contacts; None if no grasp on these edges is in force
         closure at the given friction.
+    hand : Hand
+        Contacts move along what it may touch of their edges, from where they are.
     """
 
     grasp: Grasp
     friction: float | None
     move: ContactMove | None
     together: CommonMove | None
+    hand: Hand = field(default_factory=Hand)
 
     def __str__(self) -> str:
+        limited = self.hand.limited
+        along = "slide within the limits of the hand" if limited else "move along these edges"
         move = self.move or self.together
         if self.friction is None:
-            return (
-                "no friction makes it so, and at this friction no move along these edges: "
-                "take other edges"
-                if move is None
-                else f"no friction makes it so, but at this friction it would be with {move}"
-            )
-        least = f"it would be at a friction of {upwards(self.friction)} on all edges or more"
-        return f"{least}, or with {move}" if move else f"{least}; no move along these edges does it"
+            but = "no friction makes it so, but at this friction it would be"
+            none = f"no friction makes it so, and at this friction no {along}: take other "
+            none += "places" if limited else "edges"
+        else:
+            but = f"it would be at a friction of {upwards(self.friction)} on all edges or more"
+            none, but = f"{but}; no {along} does it", f"{but}, or"
+        if move is None:
+            return none
+        apart = "; none was found that keeps the distances between the fingers of the hand"
+        return f"{but} with {move}{apart if self.hand.spaced and move.grasp is None else ''}"
 
 
 def upwards(value: float) -> str:
@@ -163,7 +177,9 @@ def _place(contact: Contact) -> str:
     return f"{contact.position:.12g}"
 
 
-def remedy(polygon: Polygon, grasp: Grasp, friction: FloatArray) -> Remedy:
+def remedy(
+    polygon: Polygon, grasp: Grasp, friction: FloatArray, hand: Hand | None = None
+) -> Remedy:
     """Return what would make a grasp force closure.
 
     Parameters
@@ -172,10 +188,17 @@ def remedy(polygon: Polygon, grasp: Grasp, friction: FloatArray) -> Remedy:
     grasp : Grasp
         Resolved, of any number of contacts on at least two edges; not in force closure.
     friction : numpy.ndarray, shape (n_edges,)
+    hand : Hand, optional
+        One without limits by default.
 
     Returns
     -------
     Remedy
+
+    Raises
+    ------
+    HandError
+        If the hand may not touch where the contacts are.
 
     Examples
     --------
@@ -184,54 +207,126 @@ def remedy(polygon: Polygon, grasp: Grasp, friction: FloatArray) -> Remedy:
     >>> found = remedy(square, grasp, np.full(4, 0.25))
     >>> round(found.friction, 8), found.move.contact, found.move.distance
     (0.375, 0, 0.125)
+    >>> remedy(square, grasp, np.full(4, 0.25), Hand(reachable={0: (0.4, 0.6)})).move.contact
+    1
     """
-    functions = torque_functions(Cones.of(polygon, friction), grasp.edges[None, :])
-    moves = [
-        move
-        for contact in range(len(grasp))
-        if (move := _contact_move(polygon, grasp, friction, functions, contact)) is not None
-    ]
+    slides = _Slides.of(polygon, grasp, friction, hand or Hand())
+    moves = [move for contact in range(len(grasp)) if (move := slides.of_one(contact)) is not None]
     return Remedy(
         grasp,
         least_friction(polygon, grasp),
-        min(moves, key=lambda move: move.distance, default=None),
-        _common_move(polygon, grasp, friction, functions),
+        min(moves, key=slides.preference, default=None),
+        slides.of_all(),
+        slides.hand,
     )
 
 
-# --- one contact --------------------------------------------------------------------------------
+@dataclass(frozen=True, eq=False)
+class _Slides:
+    """A grasp, and the segments of edges along which its contacts may slide.
 
+    Parameters
+    ----------
+    starts : numpy.ndarray, shape (m,)
+        Positions at which the segments start.
+    functions : TorqueFunctions
+        Of the segments.
+    fractions : numpy.ndarray, shape (m,)
+        Of the segments.
+    """
 
-def _contact_move(
-    polygon: Polygon,
-    grasp: Grasp,
-    friction: FloatArray,
-    functions: TorqueFunctions,
-    contact: int,
-) -> ContactMove | None:
-    """The move of one contact into the interval (υ, δ) that the others leave it, if any."""
-    interval = _interval(functions, grasp.fractions, contact)
-    if interval is None:
+    polygon: Polygon
+    grasp: Grasp
+    friction: FloatArray
+    hand: Hand
+    starts: FloatArray
+    functions: TorqueFunctions
+    fractions: FloatArray
+
+    @classmethod
+    def of(cls, polygon: Polygon, grasp: Grasp, friction: FloatArray, hand: Hand) -> _Slides:
+        held = within_reach(polygon, hand, grasp, "grasp") if hand.limited else grasp
+        cones = hand_cones(polygon, friction, hand)
+        named = held.fingers or grasp.fingers
+        group = None if named is None else np.array([hand.group_of(k) for k in named])
+        segments, fractions = cones.places(held.edges, held.fractions, group)
+        starts = cones.lower[segments] * cones.whole.lengths[grasp.edges]
+        functions = torque_functions(cones, segments[None, :])
+        within = cones.within(segments, fractions)
+        return cls(polygon, grasp, friction, hand, starts, functions, within)
+
+    def preference(self, move: ContactMove) -> tuple[bool, float]:
+        """The shortest move comes first, but for those that fingers too near or far rule out."""
+        return self.hand.spaced and move.grasp is None, move.distance
+
+    def of_one(self, contact: int) -> ContactMove | None:
+        """The move of one contact into the interval (υ, δ) that the others leave it, if any."""
+        interval = _interval(self.functions, self.fractions, contact)
+        if interval is None:
+            return None
+        low, high = (min(max(end, Fraction(0)), Fraction(1)) for end in interval)
+        here = Fraction(float(self.fractions[contact]))
+        near, far = (low, high) if here <= low else (high, low)
+        start, length = float(self.starts[contact]), float(self.functions.lengths[0, contact])
+        found, positions = None, self.grasp.positions.copy()
+        for beyond in _BEYOND:
+            part = min(Fraction(beyond), abs(far - near) / 2)
+            to = near + (part if far > near else -part)
+            positions[contact] = start + float(to) * length
+            bound = float(abs(near - here) + 2 * part) * length
+            found = self._rounded(positions, bound)
+            if found is not None:
+                break
+        return ContactMove(
+            contact,
+            self.grasp[contact],
+            float(abs(near - here)) * length,
+            (start + float(low) * length, start + float(high) * length),
+            found,
+        )
+
+    def of_all(self) -> CommonMove | None:
+        """The least common bound, and a grasp a little beyond it."""
+        functions = self.functions
+        if not functions.exists()[0]:
+            return None
+        least = common_bound(functions, self.fractions)
+        for beyond in _BEYOND:
+            bound = least * (1 + beyond) + beyond * self.polygon.diameter / 10
+            for fractions in _on_diagonal(functions, self.fractions, bound):
+                moved = self._rounded(self.starts + fractions * functions.lengths[0], bound)
+                if moved is not None:
+                    return CommonMove(least, moved)
+        return CommonMove(least, None)
+
+    def _rounded(self, positions: FloatArray, bound: float) -> Grasp | None:
+        """The grasp at positions of few digits, in force closure exactly, no two at one point.
+
+        None if it is not even so at twelve digits, or has moved farther than `bound`.
+        """
+        for digits in _DIGITS:
+            rounded = [float(f"{u:.{digits}g}") for u in positions.tolist()]
+            moves = zip(self.grasp, positions.tolist(), rounded, strict=True)
+            contacts = [c if u == c.position else Contact(c.edge, r) for c, u, r in moves]
+            try:
+                moved = self.polygon.resolve(Grasp(contacts))
+                if self.hand.limited:
+                    moved = within_reach(self.polygon, self.hand, moved, "grasp")
+            except (ContactError, HandError):  # rounded off the end of its edge, or out of reach
+                continue
+            near = np.abs(moved.positions - self.grasp.positions).max() <= bound
+            apart = near and _distinct(self.polygon, moved)
+            if apart and is_force_closure(self.polygon, moved, self.friction):
+                return moved
         return None
-    low, high = (min(max(end, Fraction(0)), Fraction(1)) for end in interval)
-    here = Fraction(float(grasp.fractions[contact]))
-    near, far = (low, high) if here <= low else (high, low)
-    length = float(functions.lengths[0, contact])
-    found, positions = None, grasp.positions.copy()
-    for beyond in _BEYOND:
-        part = min(Fraction(beyond), abs(far - near) / 2)
-        positions[contact] = float(near + (part if far > near else -part)) * length
-        bound = float(abs(near - here) + 2 * part) * length
-        found = _rounded(polygon, grasp, positions, friction, bound)
-        if found is not None:
-            break
-    return ContactMove(
-        contact,
-        grasp[contact],
-        float(abs(near - here)) * length,
-        (float(low) * length, float(high) * length),
-        found,
-    )
+
+
+def _distinct(polygon: Polygon, grasp: Grasp) -> bool:
+    points = polygon.points(grasp.edges, grasp.fractions).tolist()
+    return len({tuple(point) for point in points}) == len(grasp)
+
+
+# --- of torque functions ------------------------------------------------------------------------
 
 
 def _interval(
@@ -254,26 +349,6 @@ def _interval(
         elif value < 0:
             high = Fraction(2)
     return (low, high) if low < high and low < 1 and high > 0 else None
-
-
-# --- all contacts -------------------------------------------------------------------------------
-
-
-def _common_move(
-    polygon: Polygon, grasp: Grasp, friction: FloatArray, functions: TorqueFunctions
-) -> CommonMove | None:
-    """The least common bound, and a grasp a little beyond it."""
-    if not functions.exists()[0]:
-        return None
-    least = common_bound(functions, grasp.fractions)
-    for beyond in _BEYOND:
-        bound = least * (1 + beyond) + beyond * polygon.diameter / 10
-        for fractions in _on_diagonal(functions, grasp.fractions, bound):
-            positions = fractions * functions.lengths[0]
-            moved = _rounded(polygon, grasp, positions, friction, bound)
-            if moved is not None:
-                return CommonMove(least, moved)
-    return CommonMove(least, None)
 
 
 def common_bound(functions: TorqueFunctions, fractions: FloatArray) -> float:
@@ -331,36 +406,3 @@ def _on_diagonal(
     for part in (0.5, 0.3, 0.7):
         at = begin + part * (end - begin)
         yield np.clip(low + at * (high - low), 0.0, 1.0)
-
-
-# --- grasps that can be held --------------------------------------------------------------------
-
-
-def _rounded(
-    polygon: Polygon,
-    grasp: Grasp,
-    positions: FloatArray,
-    friction: FloatArray,
-    bound: float,
-) -> Grasp | None:
-    """The grasp at positions of few digits, in force closure exactly, no two contacts one point.
-
-    None if it is not even so at twelve digits, or has moved farther than `bound`.
-    """
-    for digits in _DIGITS:
-        rounded = [float(f"{u:.{digits}g}") for u in positions.tolist()]
-        moves = zip(grasp, positions.tolist(), rounded, strict=True)
-        contacts = [c if u == c.position else Contact(c.edge, r) for c, u, r in moves]
-        try:
-            moved = polygon.resolve(Grasp(contacts))
-        except ContactError:  # rounded off the end of its edge
-            continue
-        near = np.abs(moved.positions - grasp.positions).max() <= bound
-        if near and _distinct(polygon, moved) and is_force_closure(polygon, moved, friction):
-            return moved
-    return None
-
-
-def _distinct(polygon: Polygon, grasp: Grasp) -> bool:
-    points = polygon.points(grasp.edges, grasp.fractions).tolist()
-    return len({tuple(point) for point in points}) == len(grasp)

@@ -17,7 +17,7 @@ import numpy.typing as npt
 from regrasp_lp.errors import PolygonError
 from regrasp_lp.rings import Point, doubled_area, exact_integers, format_point
 
-__all__ = ["MAX_EXTENT", "MIN_EXTENT", "check_rings"]
+__all__ = ["MAX_EXTENT", "MIN_EXTENT", "check_rings", "conflicts", "nesting"]
 
 MIN_EXTENT = 1e-100
 """Least width and height of a ring: below, products of lengths run out of the double range."""
@@ -65,6 +65,31 @@ edge 2 of the outline, (2, 0) to (0, 2): rings may not meet themselves or each o
         edges.check_pair(i, j)
     if len(rings) > 1:
         edges.check_nesting()
+
+
+def conflicts(rings: Sequence[_Floats]) -> list[tuple[int, int]]:
+    """Return the pairs of edges that share more than the vertex between neighbours. Exact.
+
+    Examples
+    --------
+    >>> conflicts([np.array([[0.0, 0.0], [2.0, 2.0], [2.0, 0.0], [0.0, 2.0]])])
+    [(0, 2)]
+    """
+    edges = _Edges(rings, "")
+    meeting = [pair for pair in edges.meeting_candidates() if edges.meet(*pair)]
+    return [*edges.spikes(), *meeting]
+
+
+def nesting(rings: Sequence[_Floats]) -> npt.NDArray[np.bool_]:
+    """Return which rings lie in which, given that no edges meet: entry (r, s), r inside s. Exact.
+
+    Examples
+    --------
+    >>> square = np.array([[0.0, 0.0], [3.0, 0.0], [3.0, 3.0], [0.0, 3.0]])
+    >>> nesting([square, square / 4 + 1]).tolist()
+    [[False, False], [True, False]]
+    """
+    return _Edges(rings, "").inside()
 
 
 def _ring_name(r: int) -> str:
@@ -141,7 +166,7 @@ class _Edges:
             f"{format_point(self.start[i])} to {format_point(self.end[i])},"
         )
 
-    def check_spikes(self) -> None:
+    def spikes(self) -> Iterator[tuple[int, int]]:
         """Consecutive edges share more than their vertex iff the second folds back exactly."""
         after = self.end[self.following]
         for i in np.flatnonzero(_turn_signs(self.start, self.end, after) == 0).tolist():
@@ -150,10 +175,15 @@ class _Edges:
             if _turn(a, b, c) == 0 and (
                 (b[0] - a[0]) * (c[0] - b[0]) + (b[1] - a[1]) * (c[1] - b[1]) < 0
             ):
-                raise PolygonError(
-                    f"{self.label}: {self.name(j)} folds back onto {self.name(i)[:-1]}: "
-                    f"remove the spike at {format_point(self.end[i])}"
-                )
+                yield i, j
+
+    def check_spikes(self) -> None:
+        """Refuse an edge that folds back onto the one before."""
+        for i, j in self.spikes():
+            raise PolygonError(
+                f"{self.label}: {self.name(j)} folds back onto {self.name(i)[:-1]}: "
+                f"remove the spike at {format_point(self.end[i])}"
+            )
 
     def meeting_candidates(self) -> Iterator[tuple[int, int]]:
         """Pairs i < j of edges, not neighbours, that floats do not prove apart."""
@@ -174,43 +204,51 @@ class _Edges:
                 apart |= signs > 0
             yield from zip(i[~apart].tolist(), j[~apart].tolist(), strict=True)
 
-    def check_pair(self, i: int, j: int) -> None:
-        """Refuse two edges with overlapping bounding boxes that have a point in common."""
+    def meet(self, i: int, j: int) -> str | None:
+        """How two edges with overlapping bounding boxes meet, if they have a point in common."""
         (a, b), (c, d) = self.exact(i), self.exact(j)
         ends_j = [_turn(a, b, c), _turn(a, b, d)]
         ends_i = [_turn(c, d, a), _turn(c, d, b)]
         if min(ends_j) > 0 or max(ends_j) < 0 or min(ends_i) > 0 or max(ends_i) < 0:
-            return
+            return None
         if any(ends_i) and any(ends_j):
-            how = "crosses" if all(ends_i) and all(ends_j) else "touches"
-        else:
-            # on one line: they share one point if the ranges meet at their ends only
-            shared = np.minimum(self.high[i], self.high[j]) > np.maximum(self.low[i], self.low[j])
-            how = "overlaps" if shared.any() else "touches"
-        raise PolygonError(
-            f"{self.label}: {self.name(i)} {how} {self.name(j)[:-1]}: "
-            f"rings may not meet themselves or each other"
-        )
+            return "crosses" if all(ends_i) and all(ends_j) else "touches"
+        # on one line: they share one point if the ranges meet at their ends only
+        shared = np.minimum(self.high[i], self.high[j]) > np.maximum(self.low[i], self.low[j])
+        return "overlaps" if shared.any() else "touches"
 
-    def check_nesting(self) -> None:
-        """Refuse holes outside the outline or inside another hole, given that no edges meet.
+    def check_pair(self, i: int, j: int) -> None:
+        """Refuse two edges with overlapping bounding boxes that have a point in common."""
+        if how := self.meet(i, j):
+            raise PolygonError(
+                f"{self.label}: {self.name(i)} {how} {self.name(j)[:-1]}: "
+                f"rings may not meet themselves or each other"
+            )
 
-        One point a hole decides: it is inside a ring iff a ray to the right crosses an odd
+    def inside(self) -> npt.NDArray[np.bool_]:
+        """Which rings are inside which others, given that no edges meet: one row for each ring.
+
+        One point a ring decides: it is inside a ring iff a ray to the right crosses an odd
         number of the ring's edges.
         """
-        p = self.start[self.first[1:], None, :]
+        p = self.start[self.first, None, :]
         upward = self.start[:, 1] < self.end[:, 1]
-        holes = np.arange(1, len(self.first))[:, None]
         crossed = (self.start[:, 1] > p[..., 1]) != (self.end[:, 1] > p[..., 1])
-        crossed &= self.ring != holes
+        crossed &= self.ring != np.arange(len(self.first))[:, None]
         sign = _turn_signs(self.start, self.end, p)
-        for h, i in zip(*(k.tolist() for k in np.nonzero(crossed & (sign == 0))), strict=True):
-            point, _ = self.exact(int(self.first[h + 1]))
-            sign[h, i] = 1 if _turn(*self.exact(i), point) > 0 else -1
+        for r, i in zip(*(k.tolist() for k in np.nonzero(crossed & (sign == 0))), strict=True):
+            point, _ = self.exact(int(self.first[r]))
+            sign[r, i] = 1 if _turn(*self.exact(i), point) > 0 else -1
         crossed &= (sign > 0) == upward
-        inside = np.add.reduceat(crossed, self.first, axis=1, dtype=np.intp) % 2 == 1
-        for h, row in enumerate(inside):
-            at = format_point(p[h, 0])
+        inside: npt.NDArray[np.bool_] = (
+            np.add.reduceat(crossed, self.first, axis=1, dtype=np.intp) % 2 == 1
+        )
+        return inside
+
+    def check_nesting(self) -> None:
+        """Refuse holes outside the outline or inside another hole, given that no edges meet."""
+        for h, row in enumerate(self.inside()[1:]):
+            at = format_point(self.start[self.first[h + 1]])
             if not row[0]:
                 raise PolygonError(
                     f"{self.label}: hole {h} lies outside the outline, with its point {at}"

@@ -136,8 +136,8 @@ class SwitchRule:
         contacts on one edge is held, for they are then in order.
         """
         return tuple(
-            _Level.of(shadows(self.sources, held, ordered=self.hand.spaced), self)
-            for held in range(0 if self.hand.spaced else 1, 4)
+            _Level.of(shadows(self.sources, held, ordered=self.hand.coupled), self)
+            for held in range(0 if self.hand.coupled else 1, 4)
             if any(
                 held <= min(f.m, g.m) and held >= self.hand.needs[f.m, g.m]
                 for f in self.sources

@@ -12,6 +12,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from regrasp_lp.contact import Grasp
+from regrasp_lp.display import graph_html
 from regrasp_lp.friction import FloatArray
 from regrasp_lp.graph_options import GraphOptions
 from regrasp_lp.grasp_sets.collection import GraspSets
@@ -112,6 +113,9 @@ class SwitchingGraph:
     def __repr__(self) -> str:
         return f"<SwitchingGraph of {self.polygon.name!r}: {len(self)} {self.options.sets} sets>"
 
+    def _repr_html_(self) -> str:
+        return graph_html(self)
+
     def locate(self, grasp: GraspLike) -> tuple[int, ...]:
         """Return the sets that contain a grasp strictly, decided exactly.
 
@@ -195,17 +199,7 @@ class SwitchingGraph:
         return witnesses(self.sets, first, second, found)
 
     def neighbors(self, index: int) -> list[int]:
-        """Return the numbers of all adjacent sets, ascending.
-
-        Parameters
-        ----------
-        index : int
-
-        Raises
-        ------
-        IndexError
-            If there is no such set.
-        """
+        """Return the numbers of all sets adjacent to one, ascending; IndexError if it is none."""
         self.sets.place(index)
         adjacent = np.zeros(len(self), dtype=bool)
         adjacent[self.switches.neighbors(index)[0]] = True
@@ -267,6 +261,12 @@ class SwitchingGraph:
 
         save_graph(self, path)
 
+    def to_html(self, path: str | Path | None = None) -> str:
+        """Return a page to click in, and write it to `path` if given (`viewer.graph_page`)."""
+        from regrasp_lp.viewer import graph_page
+
+        return graph_page(self, path)
+
     def save_certificates(self, path: str | Path) -> None:
         """Write the proof of every decision to one file (`certificates.save_certificates`).
 
@@ -291,7 +291,8 @@ class SwitchingGraph:
         Parameters
         ----------
         start, goal : Grasp or iterable of (edge, position)
-            Any force-closure grasps of 2 or 3 contacts. Contact i of the start is finger i + 1.
+            Any force-closure grasps of 2 or 3 contacts. Contact i of the start is finger i + 1,
+            unless it names its fingers.
         aligning : {"slide", "regrip"}
             How fingers move inside a set: sliding along the edges, or by free fingers taking over.
             The latter places fingers too; of a path with the fewest placements for switching and

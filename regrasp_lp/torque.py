@@ -358,6 +358,17 @@ def torque_functions(cones: Cones, edges: IntArray) -> TorqueFunctions:
     -------
     TorqueFunctions
         Two contacts have at most two circuits, three at most eight.
+
+    Examples
+    --------
+    Opposite sides of a square, held where they face each other: one function is positive, the
+    other negative, so that the contacts are in force closure.
+
+    >>> from regrasp_lp.polygon import Polygon
+    >>> square = Polygon([(0, 0), (1, 0), (1, 1), (0, 1)])
+    >>> functions = torque_functions(Cones.of(square, 0.5), np.array([[0, 2]]))
+    >>> functions.values(np.array([[0.5, 0.5]])).round(3).tolist()
+    [[0.224, -0.224]]
     """
     edges = np.asarray(edges, dtype=np.intp)
     rays = rays_of(edges)

@@ -107,7 +107,7 @@ def _checked(
             ends[role] = checked_grasp(polygon, grasp, friction, hand, role)
         except NotForceClosureError:
             ends[role] = polygon.resolve(grasp)
-            remedies[role] = remedy(polygon, ends[role], friction)
+            remedies[role] = remedy(polygon, ends[role], friction, hand)
     return ends, remedies
 
 
@@ -128,7 +128,7 @@ def _explained(question: Regrasp, graph: SwitchingGraph, progress: Progress | No
         n_sets=len(graph),
         n_components=len(graph.components()),
         ends=ends,
-        nearest=_nearest(graph, ends) if located and not hand.spaced else None,
+        nearest=_nearest(graph, ends) if located and not hand.coupled else None,
         threshold=friction_threshold(question, progress),
         fingers=_more_fingers(question) if located else None,
         among_all=None if options.everything else route(question.with_all_sets()),

@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import os
+from collections.abc import Iterable
+from itertools import product
 from pathlib import Path
 
 import numpy as np
@@ -28,6 +30,24 @@ def star_polygon(n: int, seed: int, name: str = "") -> Polygon:
     radii = rng.uniform(0.35, 1.0, n)
     points = np.stack([radii * np.cos(angles), radii * np.sin(angles)], axis=1)
     return Polygon(points, name=name or f"star_{n}_{seed}")
+
+
+def covering(first: Iterable[object], *others: Iterable[object], least: int = 1) -> list[object]:
+    """Return all combinations for `pytest.mark.parametrize`, most of them marked slow.
+
+    Each of the first values is in `least` that are not, and each combination of the others in one.
+    """
+    mine, theirs = list(first), list(product(*others))
+    count = max(len(mine), len(theirs))
+    quick = {
+        (n % len(mine), (n + step * (len(theirs) // least)) % len(theirs))
+        for step in range(least)
+        for n in range(count)
+    }
+    return [
+        pytest.param(one, *rest, marks=[] if (i, j) in quick else pytest.mark.slow)
+        for (i, one), (j, rest) in product(enumerate(mine), enumerate(theirs))
+    ]
 
 
 @pytest.fixture(scope="session")

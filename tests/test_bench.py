@@ -278,6 +278,17 @@ def test_what_is_said_of_queries() -> None:
 # --- the command --------------------------------------------------------------------------------
 
 
+def test_a_part_runs_alone(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    arguments = ["where", "--quick", "--repeats", "1", "--cpu", "--output", str(tmp_path)]
+    assert command.main(arguments) == 0
+    written = (tmp_path / "benchmarks.md").read_text(encoding="utf-8")
+    titles = [line[4:] for line in written.splitlines() if line.startswith("### ")]
+    printed = capsys.readouterr().out
+    assert titles
+    assert all(title in printed for title in titles)
+
+
+@pytest.mark.slow
 def test_every_part_runs(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     pytest.importorskip("matplotlib")
     arguments = ["--quick", "--repeats", "1", "--cpu", "--output", str(tmp_path)]

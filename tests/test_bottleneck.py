@@ -6,6 +6,7 @@ from itertools import pairwise, product
 
 import numpy as np
 import pytest
+from conftest import covering
 from geometry import ell, rectangle, unit_square, you
 from regrasps import random_grasps
 from routes import Functions, Oracle, all_sets, widest_problem
@@ -40,8 +41,7 @@ SUBJECTS = {
 # --- what is seen -------------------------------------------------------------------------------
 
 
-@pytest.mark.parametrize("measure", MEASURES)
-@pytest.mark.parametrize("name", SUBJECTS)
+@pytest.mark.parametrize(("name", "measure"), covering(SUBJECTS, MEASURES))
 def test_a_point_is_seen_iff_the_slide_there_stays_at_the_level(name: str, measure: str) -> None:
     make, friction = SUBJECTS[name]
     polygon = make()
@@ -161,8 +161,7 @@ def random_route(
     return route
 
 
-@pytest.mark.parametrize("measure", MEASURES)
-@pytest.mark.parametrize("name", ["rectangle", "ell", "you"])
+@pytest.mark.parametrize(("name", "measure"), covering(["rectangle", "ell", "you"], MEASURES))
 def test_a_path_is_as_wide_as_its_narrowest_overlap(name: str, measure: str) -> None:
     """Convexity of the pieces attains it: the optimum of the whole path LP is the least width."""
     make, friction = SUBJECTS[name]
@@ -272,8 +271,7 @@ def tolerances(problem: PathProblem, grasps: list[np.ndarray]) -> np.ndarray:
     return np.sort([left[owners == owner].min() for owner in np.unique(owners)])
 
 
-@pytest.mark.parametrize("measure", MEASURES)
-@pytest.mark.parametrize("name", ["triangle", "ell", "you"])
+@pytest.mark.parametrize(("name", "measure"), covering(["triangle", "ell", "you"], MEASURES))
 def test_leximin_raises_every_grasp_as_far_as_it_goes(name: str, measure: str) -> None:
     make, friction = SUBJECTS[name]
     polygon = make()

@@ -11,7 +11,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from conftest import REPOSITORY
+from conftest import REPOSITORY, covering
 from geometry import comb, lattice_star, rectangle, regular, staircase, star, unit_square
 
 import regrasp_lp as rl
@@ -42,14 +42,14 @@ def graph_of(case: str, sets: str = "complete", fingers: int = 4) -> rl.Switchin
     return rl.build_switching_graph(polygon, friction, rl.Hand(fingers), sets)
 
 
-@pytest.mark.parametrize("case", CASES)
 @pytest.mark.parametrize(
-    ("sets", "fingers"), [("complete", 4), ("chapter", 4), ("complete", 5), ("chapter", 3)]
+    ("case", "of"),
+    covering(CASES, [("complete", 4), ("chapter", 4), ("complete", 5), ("chapter", 3)]),
 )
 def test_every_graph_is_certified_and_its_file_accepted(
-    case: str, sets: str, fingers: int, tmp_path: Path
+    case: str, of: tuple[str, int], tmp_path: Path
 ) -> None:
-    graph = graph_of(case, sets, fingers)
+    graph = graph_of(case, *of)
     report = rl.certify(graph)
     assert report.ok, str(report)
     assert sum(tally.yes for tally in report.sets.values()) == len(graph)
@@ -69,8 +69,9 @@ def turned(polygon: rl.Polygon, angle: float) -> rl.Polygon:
     return rl.Polygon(polygon.vertices @ turn)
 
 
-@pytest.mark.parametrize("angle", [0.05, 0.31, 0.45, 0.84, 0.97, 1.5])
-@pytest.mark.parametrize("sets", ["complete", "chapter"])
+@pytest.mark.parametrize(
+    ("angle", "sets"), covering([0.05, 0.31, 0.45, 0.84, 0.97, 1.5], ["complete", "chapter"])
+)
 def test_sets_too_thin_for_doubles_are_proved(angle: float, sets: str, tmp_path: Path) -> None:
     """Edges at 45° under μ = 1, but for rounding: some sets have no grasp in doubles."""
     graph = rl.build_switching_graph(turned(rectangle(), angle), 1.0, sets=sets)

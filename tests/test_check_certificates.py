@@ -111,7 +111,10 @@ def line_of(index: int) -> str:
 # --- accepted -------------------------------------------------------------------------------------
 
 
-@pytest.mark.parametrize("case", CASES)
+@pytest.mark.parametrize(
+    "case",
+    [pytest.param(c, marks=[pytest.mark.slow] if c == "ell, chapter" else []) for c in CASES],
+)
 def test_accepts(case: str, tmp_path: Path) -> None:
     content = lines(case)
     path = tmp_path / "file.jsonl"

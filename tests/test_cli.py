@@ -194,7 +194,7 @@ def test_friction_hand_and_alignment_reach_the_plan(run: Run) -> None:
         assert any(isinstance(step, rl.Slide) for step in steps) == slides
 
 
-@pytest.mark.parametrize("solver", ["clarabel", "highs"])
+@pytest.mark.parametrize("solver", ["highs", pytest.param("clarabel", marks=pytest.mark.slow)])
 def test_the_objective_reaches_the_plan_and_its_account(run: Run, solver: str) -> None:
     apart = ["--start", "0:5,0:40,2:40", "--goal", "1:15,3:15", "--solver", solver]
     polygon = next(p for p in rl.read_polygons("parts.geojson") if p.name == "rectangle")

@@ -179,7 +179,7 @@ def test_complete_sets_miss_nothing(name: str, mu: float) -> None:
     assert result.seen <= result.n_combinations
 
 
-@pytest.mark.parametrize("name", ["square", "comb", "star7", "regular6", "hexagon"])
+@pytest.mark.parametrize("name", ["square", "star7", "hexagon"])
 def test_every_set_of_a_small_object_is_seen(name: str) -> None:
     for mu in (0.1, 1.0):
         result = rl.coverage({**LATTICE, **GENERAL}[name], mu, samples=3000)

@@ -9,7 +9,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from conftest import REPOSITORY
+from conftest import REPOSITORY, covering
 from fourier_motzkin import Row, row, solvable
 from geometry import (
     GENERAL,
@@ -97,16 +97,7 @@ def assert_part_of_the_contact_rule(focus: SwitchingGraph, contact: SwitchingGra
 MUS = (0.05, 0.176327, 0.4, 1.0, "per edge")
 
 
-@pytest.mark.parametrize(
-    "mu",
-    [
-        0.176327,
-        0.4,
-        "per edge",
-        *(pytest.param(mu, marks=pytest.mark.slow) for mu in (0.05, 1.0)),
-    ],
-)
-@pytest.mark.parametrize("name", SHAPES)
+@pytest.mark.parametrize(("name", "mu"), covering(SHAPES, [0.176327, 0.4, "per edge", 0.05, 1.0]))
 def test_edges_are_some_of_the_contact_rule(name: str, mu: float | str) -> None:
     polygon = SHAPES[name]
     friction = spread_friction(polygon.n_edges, 0) if isinstance(mu, str) else mu
@@ -268,7 +259,13 @@ def test_adjacent_cells_have_a_point_in_common_and_only_these(
 
 @pytest.mark.parametrize(
     ("name", "mu"),
-    [("star9", 0.2), ("star7", 0.5), ("regular7", 0.3), ("hexagon", 0.25), ("star_15", 0.176327)],
+    [
+        ("star9", 0.2),
+        ("star7", 0.5),
+        ("regular7", 0.3),
+        ("hexagon", 0.25),
+        pytest.param("star_15", 0.176327, marks=pytest.mark.slow),
+    ],
 )
 def test_presolve_and_both_solvers_agree(name: str, mu: float) -> None:
     expected = edges_of(graph_of(SHAPES[name], mu))
@@ -287,9 +284,10 @@ MOVES = {
 }
 
 
-@pytest.mark.parametrize("presolve", [True, False])
-@pytest.mark.parametrize("solver", ["clarabel", "highs"])
-@pytest.mark.parametrize("move", MOVES)
+@pytest.mark.parametrize(
+    ("move", "solver", "presolve"),
+    covering(MOVES, ["clarabel", "highs"], [False, True]),
+)
 def test_moving_and_scaling_the_object_changes_nothing(
     move: str, solver: str, presolve: bool
 ) -> None:

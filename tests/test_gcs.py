@@ -26,7 +26,7 @@ def check(found: gcs.Compared) -> None:
     assert found.found.cost >= found.relaxed - slack
 
 
-@pytest.mark.parametrize("number", [0, 1, 11])
+@pytest.mark.parametrize("number", [0, pytest.param(1, marks=pytest.mark.slow), 11])
 def test_as_short_as_the_relaxation_allows(number: int) -> None:
     """Instances whose relaxation is exact: both bounds and both routes are one."""
     found = compare(gcs.instances(quick=False)[number])

@@ -7,6 +7,7 @@ from itertools import combinations
 import networkx as nx
 import numpy as np
 import pytest
+from conftest import covering
 from geometry import GENERAL, LATTICE, ell, rectangle, regular, star, unit_square
 from regrasps import PARTS, random_grasps
 
@@ -87,10 +88,11 @@ def test_adjacency_is_symmetric_and_held_as_counted(name: str, fingers: int, set
         assert held <= len(shared)
 
 
-@pytest.mark.parametrize("sets", ["complete", "chapter"])
-@pytest.mark.parametrize(("name", "fingers"), [("square", 4), ("ell", 3), ("star 8", 4)])
-def test_every_switch_has_its_witnesses(name: str, fingers: int, sets: str) -> None:
-    graph = graph_of(name, fingers, sets=sets)
+@pytest.mark.parametrize(
+    ("of", "sets"), covering([("square", 4), ("ell", 3), ("star 8", 4)], ["complete", "chapter"])
+)
+def test_every_switch_has_its_witnesses(of: tuple[str, int], sets: str) -> None:
+    graph = graph_of(*of, sets=sets)
     polygon, friction = graph.polygon, graph.friction
     rng = np.random.default_rng(0)
     pairs = list(combinations(range(len(graph)), 2))
@@ -177,7 +179,7 @@ def test_locate_is_complete(name: str) -> None:
     for friction in (0.125, 0.5, 1.5, spread_friction(polygon, 1)):
         graph = rl.build_switching_graph(polygon, friction)
         for contacts in (2, 3):
-            for grasp in random_grasps(polygon, friction, rng, 25, contacts, at_vertices=0.5):
+            for grasp in random_grasps(polygon, friction, rng, 12, contacts, at_vertices=0.5):
                 found = graph.locate(grasp)
                 assert found == tuple(sorted(set(found)))
                 edges = tuple(sorted(grasp.edges.tolist()))
@@ -319,16 +321,16 @@ def test_solvers_agree(name: str, fingers: int, sets: str) -> None:
     assert_same(by_clarabel, by_highs, 1e-8)
 
 
-@pytest.mark.parametrize("sets", ["complete", "chapter"])
 @pytest.mark.parametrize(
-    ("name", "fingers"), [("square", 3), ("ell", 4), ("nut", 4), ("star 8", 5)]
+    ("of", "sets"),
+    covering([("square", 3), ("ell", 4), ("star 8", 5), ("nut", 4)], ["complete", "chapter"]),
 )
 def test_switches_on_demand_are_the_stored_ones(
-    name: str, fingers: int, sets: str, monkeypatch: pytest.MonkeyPatch
+    of: tuple[str, int], sets: str, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    stored = graph_of(name, fingers, sets=sets)
+    stored = graph_of(*of, sets=sets)
     monkeypatch.setattr(build, "STORE_LIMIT", -1)
-    demanded = graph_of(name, fingers, sets=sets)
+    demanded = graph_of(*of, sets=sets)
     assert isinstance(stored.switches, StoredSwitches)
     assert isinstance(demanded.switches, SwitchesOnDemand)
     assert_same(stored, demanded, 0.0)

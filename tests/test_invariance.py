@@ -14,6 +14,7 @@ from random import Random
 
 import numpy as np
 import pytest
+from conftest import covering
 from geometry import GENERAL, LATTICE, comb, ell, lattice_star, rectangle, staircase
 from hypothesis import given, settings
 from hypothesis import strategies as st
@@ -341,8 +342,9 @@ def problems(draw: st.DrawFn, family: str) -> tuple[Polygon, Friction, Choice, R
     return polygon, draw(frictions(polygon.n_edges)), draw(st.sampled_from(CHOICES)), rng
 
 
-@pytest.mark.parametrize("family", FAMILIES)
-@pytest.mark.parametrize("law", LAWS, ids=lambda law: law.__name__)
+@pytest.mark.parametrize(
+    ("law", "family"), covering(LAWS, FAMILIES), ids=lambda value: getattr(value, "__name__", None)
+)
 @settings(max_examples=3)
 @given(data=st.data())
 def test_what_changes_nothing_for_random_polygons(
@@ -351,8 +353,11 @@ def test_what_changes_nothing_for_random_polygons(
     law(*data.draw(problems(family)))
 
 
-@pytest.mark.parametrize("family", FAMILIES)
-@pytest.mark.parametrize("law", [batches, presolve, reference], ids=lambda law: law.__name__)
+@pytest.mark.parametrize(
+    ("law", "family"),
+    covering([batches, presolve, reference], FAMILIES),
+    ids=lambda value: getattr(value, "__name__", None),
+)
 @settings(max_examples=1)
 @given(data=st.data())
 def test_what_takes_long_and_changes_nothing(law: Law, family: str, data: st.DataObject) -> None:

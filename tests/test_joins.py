@@ -6,6 +6,7 @@ from itertools import combinations
 
 import numpy as np
 import pytest
+from conftest import covering
 from geometry import comb, lattice_star, rectangle, regular, star
 
 from regrasp_lp import joins as module
@@ -76,9 +77,7 @@ def assert_grasps(polygon: Polygon, mu: float, first: Shadows, second: Shadows, 
         assert joins.margins[n] > 0
 
 
-@pytest.mark.parametrize("case", CASES)
-@pytest.mark.parametrize("sets", ["complete", "chapter"])
-@pytest.mark.parametrize("held", [1, 2])
+@pytest.mark.parametrize(("case", "sets", "held"), covering(CASES, ["complete", "chapter"], [1, 2]))
 def test_joins_are_grasps_and_solvers_agree(case: str, sets: str, held: int) -> None:
     polygon, mu = CASES[case]
     first, second = pairs(case, sets, held)
@@ -89,8 +88,9 @@ def test_joins_are_grasps_and_solvers_agree(case: str, sets: str, held: int) -> 
     np.testing.assert_allclose(results[0].margins, results[1].margins, atol=1e-8 * polygon.diameter)
 
 
-@pytest.mark.parametrize("case", ["star", "lattice star", "rectangle"])
-@pytest.mark.parametrize("apart", [0.0, 2.0])
+@pytest.mark.parametrize(
+    ("case", "apart"), covering(["star", "lattice star", "rectangle"], [0.0, 2.0])
+)
 def test_pruning_by_bounds_equals_all_pairs_of_pieces(case: str, apart: float) -> None:
     polygon, _ = CASES[case]
     first, second = pairs(case, "complete", 2, most=12)

@@ -4,6 +4,7 @@ from itertools import combinations, pairwise
 
 import numpy as np
 import pytest
+from conftest import covering
 from geometry import ell, rectangle, star, unit_square, you
 from hypothesis import given, settings
 from hypothesis import strategies as st
@@ -163,25 +164,28 @@ def test_levels_with_contacts_given_are_those_of_linear_programs(name: str, meas
 # --- parts --------------------------------------------------------------------------------------
 
 
-@pytest.mark.parametrize("measure", MEASURES)
 @pytest.mark.parametrize(
-    ("name", "sets"),
-    [(name, "complete") for name in SUBJECTS] + [("star", "chapter"), ("you", "chapter")],
+    ("of", "measure"),
+    covering(
+        [(name, "complete") for name in SUBJECTS] + [("star", "chapter"), ("you", "chapter")],
+        MEASURES,
+    ),
 )
-def test_parts_are_the_components_of_all_overlaps(name: str, sets: str, measure: str) -> None:
+def test_parts_are_the_components_of_all_overlaps(of: tuple[str, str], measure: str) -> None:
+    name, sets = of
     rows = rows_of(name, measure, sets)
     rng = np.random.default_rng(3)
     several = 0
     for index in rng.permutation(len(rows))[:8].tolist():
+        every = np.argwhere(np.isfinite(rows.levels(np.array([index]))[0])).tolist()
+        widths = {tuple(p): by_program(rows, index, [tuple(p)]) for p in every}
         for factor in (0.3, 0.6, 0.9):
             level = factor * float(rows.best[index])
             part = Cut(rows, level, get_solver("clarabel")).part(index)
             pieces = [tuple(p) for p in part.pieces.tolist()]
             if len(pieces) > 8:
                 continue
-            every = np.argwhere(np.isfinite(rows.levels(np.array([index]))[0])).tolist()
             clear = 1e-7 * rows.cones.size
-            widths = {tuple(p): by_program(rows, index, [tuple(p)]) for p in every}
             assert {p for p, w in widths.items() if w > level + clear} <= set(pieces)
             assert set(pieces) <= {p for p, w in widths.items() if w > level - clear}
             pairs = list(combinations(range(len(pieces)), 2))

@@ -224,9 +224,9 @@ def test_no_grasp_within_the_limits_is_missed_and_none_beyond_is_in(
     polygon: rl.Polygon, friction: float, hand: rl.Hand
 ) -> None:
     graph = rl.build_switching_graph(polygon, friction, hand)
-    grid = np.linspace(0, 1, 10)
     inside = outside = 0
     for m in (2, 3):
+        grid = np.linspace(0, 1, 10 if m == 2 else 7)
         for edges in combinations_with_replacement(range(polygon.n_edges), m):
             places = [f for f in product(grid, repeat=m) if list(f) == sorted(f) or m == 2]
             closed = rl.is_force_closure(
@@ -284,7 +284,7 @@ def test_switches_against_brute_force() -> None:
 
 
 @given(stars(), st.sampled_from(FRICTIONS), st.floats(0, 0.4), st.floats(0, 0.4))
-@settings(max_examples=25)
+@settings(max_examples=10)
 def test_tighter_limits_leave_less(
     polygon: rl.Polygon, friction: float, one: float, other: float
 ) -> None:
@@ -399,10 +399,10 @@ def test_pieces_and_forms_are_over_positions_along_whole_edges() -> None:
 def test_room() -> None:
     hand = rl.Hand(edge_clearance=2, reachable={0: [(8, 24), (40, 56)]})
     cones = hand_cones(BRACKET, 0.3, hand)
-    at = [BRACKET.resolve_contact(c) for c in ((0, 10.0), (1, 8.0))]
+    at = {1: BRACKET.resolve_contact((0, 10.0)), 2: BRACKET.resolve_contact((1, 8.0))}
     assert room(cones, hand, at) == 2.0
-    assert room(cones, hand, at[1:]) == 6.0
-    assert room(cones, hand, [BRACKET.resolve_contact((0, 30.0))]) == -6.0
+    assert room(cones, hand, {2: at[2]}) == 6.0
+    assert room(cones, hand, {1: BRACKET.resolve_contact((0, 30.0))}) == -6.0
     free = hand_cones(BRACKET, 0.3, rl.Hand())
     assert room(free, rl.Hand(), at) == np.inf
 

@@ -23,8 +23,9 @@ from concurrent.futures import (
     ProcessPoolExecutor,
     ThreadPoolExecutor,
 )
+from contextlib import contextmanager, suppress
 from functools import partial
-from itertools import count, permutations
+from itertools import count
 from pathlib import Path
 
 import numpy as np
@@ -85,7 +86,7 @@ def cluster(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Executor]:
     with (
         dask.config.set(settings),
         distributed.LocalCluster(
-            n_workers=2, threads_per_worker=1, processes=True, dashboard_address=None
+            n_workers=2, threads_per_worker=1, processes=True, dashboard_address=":0"
         ) as local,
         distributed.Client(local) as client,
     ):
@@ -643,16 +644,24 @@ PARTS = str(REPOSITORY / "models" / "workpieces.geojson")
 LONG = [str(REPOSITORY / "models"), "--sets", "complete", "--friction", "0.7"]
 
 
-def start(*arguments: str, **options: object) -> subprocess.Popen[str]:
-    return subprocess.Popen(
+@contextmanager
+def started(*arguments: str) -> Iterator[subprocess.Popen[str]]:
+    """A table in a session of its own, of which nothing is left behind if a test fails."""
+    process = subprocess.Popen(
         [sys.executable, "-m", "regrasp_lp", "table", *arguments, "--jobs", "2"],
         stdout=subprocess.PIPE,
         stderr=subprocess.PIPE,
         text=True,
         env={**os.environ, "PYTHONPATH": str(REPOSITORY)},
         start_new_session=True,
-        **options,
     )
+    try:
+        yield process
+    finally:
+        for one in running(process.pid):
+            with suppress(ProcessLookupError):  # has just ended
+                os.kill(one, signal.SIGKILL)
+        process.communicate()
 
 
 def rows(text: str) -> list[dict[str, str]]:
@@ -699,27 +708,27 @@ needs_proc = pytest.mark.skipif(not Path("/proc/self/stat").exists(), reason="lo
 @pytest.mark.parametrize(("everybody", "later"), [(True, 0.0), (False, 0.8)])
 def test_an_interrupt_ends_all_at_once(everybody: bool, later: float) -> None:
     """While processes start, and while they work; of one process, or, as Ctrl-C, of all."""
-    process = start(*LONG)
-    wait_until(lambda: len(running(process.pid)) >= 3)  # one of them keeps semaphores in order
-    time.sleep(later)
-    sent = time.monotonic()
-    (os.killpg if everybody else os.kill)(process.pid, signal.SIGINT)
-    out, err = process.communicate(timeout=30)
-    assert time.monotonic() - sent < 5
-    assert (process.returncode, out) == (130, "")
-    # a thread of the pool may complain of the futures that were cancelled under it
-    assert err.endswith("regrasp-lp: interrupted\n")
-    wait_until(lambda: not running(process.pid), 5)
+    with started(*LONG) as process:
+        wait_until(lambda: len(running(process.pid)) >= 3)  # one of them keeps semaphores in order
+        time.sleep(later)
+        sent = time.monotonic()
+        (os.killpg if everybody else os.kill)(process.pid, signal.SIGINT)
+        out, err = process.communicate(timeout=30)
+        assert time.monotonic() - sent < 5
+        assert (process.returncode, out) == (130, "")
+        # a thread of the pool may complain of the futures that were cancelled under it
+        assert err.endswith("regrasp-lp: interrupted\n")
+        wait_until(lambda: not running(process.pid), 5)
 
 
 @needs_proc
 def test_no_process_outlives_one_that_is_killed() -> None:
-    process = start(*LONG)
-    wait_until(lambda: len(running(process.pid)) == 4)
-    time.sleep(0.5)
-    process.kill()
-    process.communicate(timeout=30)
-    wait_until(lambda: not running(process.pid))
+    with started(*LONG) as process:
+        wait_until(lambda: len(running(process.pid)) == 4)
+        time.sleep(0.5)
+        process.kill()
+        process.communicate(timeout=30)
+        wait_until(lambda: not running(process.pid))
 
 
 @needs_proc
@@ -776,7 +785,7 @@ def test_the_bar_counts_polygons(monkeypatch: pytest.MonkeyPatch) -> None:
 
 
 def test_permutations_of_the_input_change_nothing(serial: list[rl.SwitchingGraph]) -> None:
-    for order in list(permutations(range(3)))[1:]:
+    for order in [(1, 2, 0), (2, 1, 0)]:
         polygons = [OBJECTS[k] for k in order]
         found = rl.build_switching_graphs(polygons, FRICTION, Inline(), ordered=True)
         assert [one.graph == serial[k] for one, k in zip(found, order, strict=True)] == [True] * 3

@@ -7,7 +7,7 @@ from collections.abc import Iterator
 import numpy as np
 import pytest
 from bench.subjects import random_grasps
-from conftest import star_polygon
+from conftest import covering, star_polygon
 
 import regrasp_lp as rl
 from regrasp_lp.friction import Cones
@@ -38,8 +38,7 @@ def surroundings(
     return Surroundings(polygon, cones, get_solver("clarabel"), start, goal, measure)
 
 
-@pytest.mark.parametrize("measure", MEASURES)
-@pytest.mark.parametrize("n", [21, 24])
+@pytest.mark.parametrize(("n", "measure"), covering([21, 24], MEASURES))
 def test_some_edges_against_all(n: int, measure: Measure, monkeypatch: pytest.MonkeyPatch) -> None:
     """The plan is no better than the best, the bound no worse; a gap of 0 is one."""
     monkeypatch.setattr(nearby, "_WHOLE", 8)

@@ -16,10 +16,15 @@ NOTEBOOKS = sorted(FOLDER.glob("*.ipynb"))
 def test_there_are_notebooks() -> None:
     assert [path.stem for path in NOTEBOOKS] == [
         "coverage",
+        "fingers",
+        "friction",
         "grasp_sets",
         "objectives",
         "regrasps",
         "tables",
+        "tolerances",
+        "trust",
+        "two_rules",
     ]
 
 

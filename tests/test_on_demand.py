@@ -6,6 +6,7 @@ from itertools import pairwise
 
 import numpy as np
 import pytest
+from conftest import covering
 from geometry import star
 
 import regrasp_lp as rl
@@ -35,8 +36,7 @@ def cost(graph: rl.SwitchingGraph, path: list[int]) -> int:
     return sum(int(contacts[j]) - int(h or 0) for j, h in zip(path[1:], held, strict=True))
 
 
-@pytest.mark.parametrize("friction", [0.12, 0.3, 0.8, 1.5])
-@pytest.mark.parametrize("n", [5, 9, 16])
+@pytest.mark.parametrize(("n", "friction"), covering([5, 9, 16], [0.12, 0.3, 0.8, 1.5]))
 def test_as_few_placements_as_in_the_whole_graph(n: int, friction: float) -> None:
     polygon = star(n, seed=n)
     graph = rl.build_switching_graph(polygon, friction)

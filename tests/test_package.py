@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import ast
+import importlib
 import inspect
 import subprocess
 import sys
@@ -18,9 +19,11 @@ ROOT = REPOSITORY / "regrasp_lp"
 
 TEXT = """
 check_certificates
-errors
-contact  rings  ring_checks  polygon  wkt  files
-directions  friction  wrenches  force_closure  random_grasps
+errors  display
+contact  rings  ring_checks  polygon  wkt
+outlines  outlines.curves  outlines.drawing  outlines.dxf
+outlines.svg_elements  outlines.svg_shapes  outlines.svg  outlines.simplification  files
+directions  friction  wrenches  force_closure  random_grasps  grasp_samples
 circuits  torque  margins
 linear_sets
 lp.solver  lp.ladder  lp.margin_lp  lp.highs_solver  lp.clarabel_solver  lp.exact_solver
@@ -30,8 +33,12 @@ grasp_sets  grasp_sets.candidates  grasp_sets.families  grasp_sets.pieces  grasp
 grasp_sets.set_pieces  grasp_sets.vertices  grasp_sets.spaced
 grasp_sets.sweeps  grasp_sets.focus  grasp_sets.double_cones  grasp_sets.parallel
 grasp_sets.grasp_set  grasp_sets.collection
-quality  remedies
-planning  planning.hand  planning.reach  planning.steps  planning.objective
+quality.grasps  quality.stability  quality.hulls  quality.friction_needed  quality.volumes
+quality.wrenches  quality.focus  quality.regions  quality.metrics  quality.epsilon_bounds
+quality.best_grasps  quality.maps
+quality
+planning  planning.touching  planning.hand  planning.reach
+remedies  planning.steps  planning.objective
 shadows  switching  joins  contact_rule  couplings  handovers  focus_rule  switches
 planning.plan_document  planning.limit_checks  planning.verification  planning.along
 planning.plan  planning.plan_file
@@ -39,12 +46,12 @@ planning.regions  planning.limits  planning.plan_program  planning.friction_chan
 planning.sensitivity  planning.account
 planning.branches  planning.search  planning.steering
 planning.aligning  planning.path_lp
-planning.path_optimum  planning.regrip  planning.hops
-planning.execution  planning.performance
+planning.path_optimum  planning.staying  planning.regrip  planning.hops
+planning.fingers  planning.clearing  planning.execution  planning.performance
 planning.shortest_slide  planning.set_rows  planning.route_lp  planning.costs
 planning.route_search  planning.shortest
 planning.levels  planning.moves  planning.ends  planning.bottleneck  planning.widest
-planning.alternatives  planning.widest_routes
+planning.alternatives  planning.widest_routes  planning.set_path
 planning.requests  planning.planner  planning.on_demand  planning.growing  planning.nearby
 planning.hit_and_run  planning.layers  planning.path_choices  planning.path_steps
 planning.path_model
@@ -54,13 +61,15 @@ certification  certificates
 build  graph_file  nearest_switch  connection  explanation  why_not
 workers  many
 membership  sampling  completeness
+colors  graph_layout
+viewer.page  viewer.plans  viewer.graphs  viewer
 plotting.palette  plotting.placement  plotting.frame  plotting.outline  plotting.grasps
-plotting.scene  plotting.focus_cells  plotting.focus_switch  plotting.parallel_sets
-plotting.friction_cones
+plotting.sets  plotting.scene  plotting.focus_cells  plotting.focus_switch  plotting.parallel_sets
+plotting.friction_cones  plotting.quality
 plotting.regions  plotting.contact_space  plotting.normals  plotting.graph
-plotting.filmstrip  plotting
+plotting.filmstrip  plotting.animation  plotting
 __init__
-cli.progress  cli.values  cli.hand_options  cli.far_apart  cli.alternatives
+cli.progress  cli.values  cli.hand_options  cli.object_options  cli.far_apart  cli.alternatives
 cli.tables  cli.arguments  cli.commands
 cli
 __main__
@@ -136,7 +145,7 @@ def test_imports_point_upwards(name: str) -> None:
 
 def test_the_exact_checks_share_nothing_with_the_planner() -> None:
     geometry = {"errors", "contact", "rings", "ring_checks", "polygon", "directions", "friction"}
-    geometry |= {"wrenches"}
+    geometry |= {"wrenches", "display"}
     assert reached("force_closure") <= geometry
     assert reached("planning.verification") <= geometry | {
         "force_closure",
@@ -183,11 +192,31 @@ def test_no_bare_except_and_no_global_state(name: str) -> None:
 
 def test_importing_loads_no_optional_package() -> None:
     heavy = ["cvxpy", "networkx", "matplotlib", "shapely", "pandas", "dask", "distributed"]
+    heavy += ["PIL", "ezdxf", "svgpathtools", "scipy", "clarabel", "highspy"]
     code = f"import sys, regrasp_lp; print([m for m in {heavy} if m in sys.modules])"
     found = subprocess.run(
         [sys.executable, "-c", code], capture_output=True, text=True, cwd=REPOSITORY, check=True
     )
     assert found.stdout.strip() == "[]"
+
+
+def test_public_names_are_where_they_are_imported_from() -> None:
+    """What type checkers read in the package is what it does when a name is asked for."""
+    (block,) = (n for n in modules()["__init__"].body if isinstance(n, ast.If))
+    read = {
+        alias.name: node.module.removeprefix("regrasp_lp").removeprefix(".")
+        for node in block.body
+        if isinstance(node, ast.ImportFrom) and node.module
+        for alias in node.names
+    }
+    assert read.pop("quality") == ""
+    assert read == rl._HOMES
+    assert sorted([*read, "quality"]) == sorted(rl.__all__)
+    for name, home in read.items():
+        assert getattr(rl, name) is getattr(importlib.import_module(f"regrasp_lp.{home}"), name)
+    assert sorted(dir(rl)) == sorted([*rl.__all__, "__version__"])
+    with pytest.raises(AttributeError, match="no attribute 'toleranse'"):
+        rl.toleranse  # noqa: B018
 
 
 # --- public names -------------------------------------------------------------------------------

@@ -8,6 +8,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+from conftest import covering
 from geometry import comb, ell, rectangle, star
 from regrasps import nut, random_grasps, tee
 from scipy.optimize import linprog
@@ -163,8 +164,7 @@ def chains(
     return found
 
 
-@pytest.mark.parametrize("solver", ["clarabel", "highs"])
-@pytest.mark.parametrize("name", CASES)
+@pytest.mark.parametrize(("name", "solver"), covering(CASES, ["clarabel", "highs"]))
 def test_no_tolerance_is_larger(name: str, solver: str, monkeypatch: pytest.MonkeyPatch) -> None:
     found = chains(name, monkeypatch, solver)
     assert found

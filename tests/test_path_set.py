@@ -197,7 +197,7 @@ def holds(path: PathSet, grasps: list[tuple[np.ndarray, np.ndarray]]) -> bool:
         ("block", [(0, 2), (0, 1, 2)]),
         ("block", [(0, 1, 2)]),
         ("block", [(0, 2), (0, 0, 2)]),
-        ("bracket", [(0, 4), (0, 4, 5), (3, 5)]),
+        pytest.param("bracket", [(0, 4), (0, 4, 5), (3, 5)], marks=pytest.mark.slow),
     ],
 )
 def test_alternatives_cover_all_choices(name: str, edges: list[tuple[int, ...]]) -> None:

@@ -6,6 +6,7 @@ from fractions import Fraction
 
 import numpy as np
 import pytest
+from conftest import covering
 from geometry import GENERAL, LATTICE, exact_ray, rectangle, unit_square
 from regrasps import PARTS, random_grasps
 
@@ -23,8 +24,7 @@ def batch(polygon: rl.Polygon, contacts: int, seed: int, count: int = 300) -> tu
     return edges, np.where(coarse, np.round(4 * fractions) / 4, fractions)
 
 
-@pytest.mark.parametrize("friction", [0.125, 0.5, 1.5])
-@pytest.mark.parametrize("name", POLYGONS)
+@pytest.mark.parametrize(("name", "friction"), covering(POLYGONS, [0.125, 0.5, 1.5]))
 def test_batch_is_loop_and_sign_is_force_closure(name: str, friction: float) -> None:
     polygon = POLYGONS[name]
     for contacts in (2, 3, 4):

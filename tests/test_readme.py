@@ -1,53 +1,36 @@
-"""The examples of the README run, one after the other, and print what it says."""
+"""The examples of the README run and print what it says; links of all pages lead somewhere."""
 
 from __future__ import annotations
 
-import math
 import re
+from importlib import import_module
 from pathlib import Path
 
 import pytest
 from conftest import REPOSITORY
 
-TEXT = (REPOSITORY / "README.md").read_text(encoding="utf-8")
-EXAMPLES = re.findall(r"```python\n(.*?)```\n(?:\n```\n(.*?)```\n)?", TEXT, re.DOTALL)
-"""Each with what it prints, if that is shown."""
+README = REPOSITORY / "README.md"
+PAGES = [README, *sorted((REPOSITORY / "docs").rglob("*.md"))]
 
 
-def alike(one: str, other: str) -> bool:
-    """Whether two texts have the same words, and numbers that are equal to 1 %."""
-    words, others = (re.split(r"[\s:,]+", text.strip()) for text in (one, other))
-    return len(words) == len(others) and all(map(same, words, others))
-
-
-def same(word: str, other: str) -> bool:
-    try:
-        return math.isclose(float(word), float(other), rel_tol=0.01, abs_tol=1e-3)
-    except ValueError:
-        return word == other
-
-
-def test_examples_run(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
-) -> None:
+def test_examples_run(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     pytest.importorskip("matplotlib").use("Agg")
+    monkeypatch.syspath_prepend(REPOSITORY / "docs")
+    snippets = import_module("snippets")
     (tmp_path / "models").symlink_to(REPOSITORY / "models")
     monkeypatch.chdir(tmp_path)
-    names = {"__name__": "readme"}
-    shown = 0
-    for code, expected in EXAMPLES:
-        exec(compile(code, code.splitlines()[0], "exec"), names)
-        printed = capsys.readouterr().out
-        assert not expected or alike(printed, expected), printed
-        shown += bool(expected)
-    assert len(EXAMPLES) > 10
-    assert shown >= 2
+    ran = snippets.run(README)
+    for example, printed in ran:
+        assert not example.shown or snippets.alike(example.shown, printed), printed
+    assert len(ran) > 4
+    assert sum(bool(example.shown) for example, _ in ran) >= 2
 
 
-@pytest.mark.parametrize("path", [REPOSITORY / "README.md", *(REPOSITORY / "docs").glob("*.md")])
+@pytest.mark.parametrize("path", PAGES, ids=lambda page: page.relative_to(REPOSITORY).as_posix())
 def test_links_lead_somewhere(path: Path) -> None:
     """To files that are there, and to headings of them."""
-    links = re.findall(r"\]\(([^)\s]+)\)", path.read_text(encoding="utf-8"))
+    text = re.sub(r"```.*?```", "", path.read_text(encoding="utf-8"), flags=re.DOTALL)
+    links = re.findall(r"\]\(([^)\s]+)\)", text)
     for link in links:
         if "://" in link:
             continue

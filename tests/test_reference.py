@@ -9,6 +9,7 @@ from itertools import combinations
 import numpy as np
 import pytest
 import shapely
+from conftest import covering
 from geometry import (
     GENERAL,
     LATTICE,
@@ -138,9 +139,10 @@ def test_outermost() -> None:
 # --- whole graphs -------------------------------------------------------------------------------
 
 
-@pytest.mark.parametrize("name", SHAPES)
-@pytest.mark.parametrize("mu", [TAN_10, 0.5, 1.0, "per edge"])
-@pytest.mark.parametrize("switching", ["focus", "contact"])
+@pytest.mark.parametrize(
+    ("name", "mu", "switching"),
+    covering(SHAPES, [TAN_10, 0.5, 1.0, "per edge"], ["focus", "contact"], least=2),
+)
 def test_geos_and_whole_numbers_agree(name: str, mu: float | str, switching: str) -> None:
     polygon = SHAPES[name]
     friction = friction_of(polygon, mu)
@@ -148,9 +150,10 @@ def test_geos_and_whole_numbers_agree(name: str, mu: float | str, switching: str
     assert graph == reference_graph(polygon, friction, switching, exact=True)
 
 
-@pytest.mark.parametrize("name", SHAPES)
-@pytest.mark.parametrize("mu", [0.1, 0.3, 0.57, 2.0, "per edge"])
-@pytest.mark.parametrize("switching", ["focus", "contact"])
+@pytest.mark.parametrize(
+    ("name", "mu", "switching"),
+    covering(SHAPES, [0.1, 0.3, 0.57, 2.0, "per edge"], ["focus", "contact"], least=2),
+)
 def test_the_library_finds_the_same_graph(name: str, mu: float | str, switching: str) -> None:
     polygon = SHAPES[name]
     friction = friction_of(polygon, mu)

@@ -33,7 +33,7 @@ def test_moves_between_grasps_of_one_piece(polygon: rl.Polygon) -> None:
     rng = np.random.default_rng(0)
     graph = rl.build_switching_graph(polygon, 0.3)
     tried = 0
-    for index in rng.permutation(len(graph))[:40]:
+    for index in rng.permutation(len(graph))[:15]:
         functions = graph.sets.functions(int(index))
         samples = rng.random((300, functions.m))
         samples.sort(axis=1)

@@ -6,7 +6,7 @@ from collections.abc import Sequence
 from dataclasses import replace
 from fractions import Fraction
 from functools import cache
-from itertools import combinations, permutations
+from itertools import combinations
 
 import numpy as np
 import pytest
@@ -368,7 +368,7 @@ def test_order_and_repetition_change_nothing(name: str) -> None:
     friction = spread_friction(polygon.n_edges, 2)
     three = some_regions(polygon.n_edges, 3, 150)
     expected = meets(polygon, friction, three)
-    for order in permutations(range(3)):
+    for order in ((0, 1, 2), (1, 2, 0), (2, 1, 0)):
         np.testing.assert_array_equal(meets(polygon, friction, three[:, order]), expected)
         repeated = np.column_stack((three[:, order], three[:, order[0]]))
         np.testing.assert_array_equal(meets(polygon, friction, repeated), expected)

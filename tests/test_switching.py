@@ -14,6 +14,7 @@ from itertools import combinations, permutations
 
 import numpy as np
 import pytest
+from conftest import covering
 from fourier_motzkin import box, intersect, pieces, row, solvable, widen
 from geometry import (
     LATTICE,
@@ -422,9 +423,7 @@ def test_touching_intervals_do_not_meet(first: tuple, second: tuple, expected: b
 # --- the decision on grasp sets -----------------------------------------------------------------
 
 
-@pytest.mark.parametrize("case", CASES)
-@pytest.mark.parametrize("sets", ["complete", "chapter"])
-@pytest.mark.parametrize("held", [1, 2])
+@pytest.mark.parametrize(("case", "sets", "held"), covering(CASES, ["complete", "chapter"], [1, 2]))
 def test_the_filter_agrees_with_rational_numbers(case: str, sets: str, held: int) -> None:
     found = pairs_of(case, sets, held)
     rng = np.random.default_rng(0)
@@ -465,8 +464,7 @@ def test_touching_projections_reach_the_rational_numbers(
     assert answers.count(None) > 3
 
 
-@pytest.mark.parametrize("case", CASES)
-@pytest.mark.parametrize("held", [1, 2])
+@pytest.mark.parametrize(("case", "held"), covering(CASES, [1, 2]))
 def test_switches_against_samples_and_linear_programs(case: str, held: int) -> None:
     """No sampled common contacts where the answer is no; where it is yes and no sample shows it,
     a linear program finds two grasps, exactly in force closure.
@@ -520,9 +518,12 @@ def sampled(polygon: Polygon, friction: float | tuple, shadow: Shadows) -> np.nd
 
 
 @pytest.mark.parametrize(
-    "case", ["comb, slippery", "lattice star", "lattice star, touching", "star"]
+    ("case", "sets"),
+    covering(
+        ["comb, slippery", "lattice star", "lattice star, touching", "star"],
+        ["complete", "chapter"],
+    ),
 )
-@pytest.mark.parametrize("sets", ["complete", "chapter"])
 def test_switches_against_elimination_in_full_coordinates(case: str, sets: str) -> None:
     for held in (1, 2):
         found = pairs_of(case, sets, held)

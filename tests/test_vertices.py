@@ -8,6 +8,7 @@ from itertools import product
 import numpy as np
 import pytest
 import shapely
+from conftest import covering
 from fourier_motzkin import box, row, solvable
 from geometry import (
     GENERAL,
@@ -70,8 +71,7 @@ def cones_of(name: str) -> Cones:
 # --- deciders -----------------------------------------------------------------------------------
 
 
-@pytest.mark.parametrize("name", SHAPES)
-@pytest.mark.parametrize("kind", KINDS)
+@pytest.mark.parametrize(("name", "kind"), covering(SHAPES, KINDS))
 def test_presolve_and_both_solvers_agree(name: str, kind: str) -> None:
     cones = cones_of(name)
     families = [
@@ -111,9 +111,7 @@ def assert_witnesses(polygon: Polygon, friction: float | tuple, family: Family) 
             assert (gap[family.margins > 1e-12 * size] > 0).all()  # else nothing can be moved
 
 
-@pytest.mark.parametrize("name", SHAPES)
-@pytest.mark.parametrize("kind", KINDS)
-@pytest.mark.parametrize("presolve", [True, False])
+@pytest.mark.parametrize(("name", "kind", "presolve"), covering(SHAPES, KINDS, [True, False]))
 def test_witnesses_are_grasps(name: str, kind: str, presolve: bool) -> None:
     polygon, friction = SHAPES[name]
     for solver in (CLARABEL, HIGHS):

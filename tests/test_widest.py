@@ -7,6 +7,7 @@ from itertools import pairwise
 
 import numpy as np
 import pytest
+from conftest import covering
 from geometry import ell, rectangle, unit_square, you
 from polygons import moved
 from regrasps import PARTS, Replay, random_grasps
@@ -67,7 +68,7 @@ BRUTE = [
     ("rectangle", 0.15, 4, "tolerance", 1),
     ("square", 0.6, 4, "margin", 1),
     ("square", 0.3, 3, "tolerance", 1),
-    ("ell", 0.15, 3, "margin", 0),
+    pytest.param("ell", 0.15, 3, "margin", 0, marks=pytest.mark.slow),
     ("ell", 0.15, 4, "tolerance", 0),
 ]
 
@@ -121,7 +122,7 @@ def test_no_path_of_pieces_is_wider_in_many_queries(
     assert_best(name, friction, fingers, measure, seed)
 
 
-@pytest.mark.parametrize("name", ["star 8", "ell"])
+@pytest.mark.parametrize("name", [pytest.param("star 8", marks=pytest.mark.slow), "ell"])
 def test_the_same_among_the_chapters_sets(name: str) -> None:
     """Sets of two fingers and concurrent ones, whose functions are those of the complete sets."""
     polygon = MAKE[name]()
@@ -190,11 +191,9 @@ def test_no_random_motion_beats_the_bound(
 LAWS = [("ell", 0.15), ("rectangle", 0.3), ("you", 0.3)]
 
 
-@pytest.mark.parametrize("measure", ["margin", "tolerance"])
-@pytest.mark.parametrize(("name", "friction"), LAWS)
-def test_never_worse_than_with_the_fewest_placements(
-    name: str, friction: float, measure: str
-) -> None:
+@pytest.mark.parametrize(("of", "measure"), covering(LAWS, ["margin", "tolerance"]))
+def test_never_worse_than_with_the_fewest_placements(of: tuple[str, float], measure: str) -> None:
+    name, friction = of
     polygon = MAKE[name]()
     graph = rl.build_switching_graph(polygon, friction)
     for start, goal in queries(polygon, friction, 4, 7):
@@ -226,8 +225,9 @@ def test_more_fingers_are_never_worse(name: str, friction: float) -> None:
         assert all(more >= less * (1 - EQUAL) for less, more in pairwise(values))
 
 
-@pytest.mark.parametrize("measure", ["margin", "tolerance"])
-@pytest.mark.parametrize("name", ["ell", "you", "hexagon"])
+@pytest.mark.parametrize(
+    ("name", "measure"), covering(["ell", "you", "hexagon"], ["margin", "tolerance"])
+)
 def test_more_friction_is_never_worse(name: str, measure: str) -> None:
     """Of the least over all grasps, those that are given too: these get better themselves."""
     polygon = MAKE[name]()
@@ -242,7 +242,7 @@ def test_more_friction_is_never_worse(name: str, measure: str) -> None:
         assert all(more >= less * (1 - EQUAL) - 1e-12 for less, more in pairwise(values))
 
 
-@pytest.mark.parametrize(("name", "friction"), [("ell", 0.15), ("you", 0.3), ("star 8", 0.15)])
+@pytest.mark.parametrize(("name", "friction"), [("ell", 0.15), ("you", 0.3)])
 def test_more_sets_are_never_worse(name: str, friction: float) -> None:
     polygon = MAKE[name]()
     graphs = [

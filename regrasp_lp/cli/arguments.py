@@ -11,6 +11,7 @@ from typing import Any, NoReturn
 import regrasp_lp
 from regrasp_lp.cli import values
 from regrasp_lp.cli.hand_options import add_hand
+from regrasp_lp.cli.object_options import add_object
 from regrasp_lp.errors import OptionError
 
 PROGRAM = "regrasp-lp"
@@ -210,7 +211,7 @@ def _late(name: str) -> Callable[[argparse.Namespace], int]:
 
 
 def _add_plan(parser: argparse.ArgumentParser) -> None:
-    _add_object(parser, "needed if the file holds several")
+    add_object(parser, "needed if the file holds several")
     _add_grasps(parser)
     _add_model(parser)
     parser.add_argument(
@@ -244,10 +245,12 @@ def _add_plan(parser: argparse.ArgumentParser) -> None:
     files = parser.add_argument_group("files to write")
     _add_output(files, "--json", values.output_file, "the plan, for `check`; others as OUT-2, ...")
     _add_output(files, "--plot", values.picture_file, "a filmstrip of it: .png, .svg or .pdf")
+    _add_output(files, "--gif", values.animation_file, "an animation of it")
+    _add_output(files, "--html", values.output_file, "a page to step through it in a browser")
 
 
 def _add_graph(parser: argparse.ArgumentParser) -> None:
-    _add_object(parser, "all of them by default")
+    add_object(parser, "all of them by default")
     _add_switching(_add_model(parser), "contact")
     parser.add_argument(
         "--min-margin",
@@ -260,6 +263,7 @@ def _add_graph(parser: argparse.ArgumentParser) -> None:
     files = parser.add_argument_group("files to write")
     _add_output(files, "--save", values.output_file, "the graph, for regrasp_lp.load_graph")
     _add_output(files, "--certificates", values.output_file, "a proof of it, for `check`")
+    _add_output(files, "--html", values.output_file, "a page to click in, for a browser")
 
 
 def _add_table(parser: argparse.ArgumentParser) -> None:
@@ -310,7 +314,7 @@ def _add_table(parser: argparse.ArgumentParser) -> None:
 
 
 def _add_show(parser: argparse.ArgumentParser) -> None:
-    _add_object(parser, "needed if the file holds several")
+    add_object(parser, "needed if the file holds several")
     parser.add_argument(
         "-o",
         "--plot",
@@ -325,21 +329,16 @@ def _add_show(parser: argparse.ArgumentParser) -> None:
     )
 
 
-def _add_object(parser: argparse.ArgumentParser, which: str) -> None:
-    parser.add_argument("file", metavar="FILE", help="polygons, as GeoJSON or as WKT")
-    parser.add_argument("--name", help=f"the polygon to take; {which}")
-
-
 def _add_grasps(parser: argparse.ArgumentParser) -> None:
     group = parser.add_argument_group("start and goal (2 or 3 contacts each)")
-    for role in ("start", "goal"):
+    whose_of = {"start": "of fingers 1, 2, ... or as in 3@4:0.3,1@0:1.2", "goal": "of any fingers"}
+    for role, whose in whose_of.items():
         either = group.add_mutually_exclusive_group()
         either.add_argument(
             f"--{role}",
             type=values.grasp,
             metavar="CONTACTS",
-            help="edge:position pairs separated by commas"
-            + ("; the first is finger 1" if role == "start" else ", reached by any fingers"),
+            help=f"edge:position pairs separated by commas, {whose}",
         )
         either.add_argument(
             f"--{role}-xy",

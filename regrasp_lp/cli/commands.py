@@ -21,9 +21,10 @@ from regrasp_lp.cli.alternatives import alternatives_text
 from regrasp_lp.cli.arguments import PROGRAM
 from regrasp_lp.cli.far_apart import far_apart
 from regrasp_lp.cli.hand_options import hand_of
+from regrasp_lp.cli.object_options import polygons_of
 from regrasp_lp.cli.progress import ProgressBar, complain
 from regrasp_lp.cli.tables import attempt, polygon_files, summaries_of
-from regrasp_lp.cli.values import PICTURES, grasp_text
+from regrasp_lp.cli.values import ANIMATION, PICTURES, grasp_text
 from regrasp_lp.errors import (
     ContactError,
     FileFormatError,
@@ -49,8 +50,8 @@ _TABLES = {"text": text_table, "csv": csv_table, "markdown": markdown_table}
 
 def plan(options: Namespace) -> int:
     """Plan from one grasp to another."""
-    _check_outputs(options.file, options.json, options.plot)
-    polygon = _one_polygon(options.file, options.name)
+    _check_outputs(options.file, options.json, options.plot, options.gif, options.html)
+    polygon = _one_polygon(options)
     friction = _friction(polygon, options.friction)
     hand = hand_of(options)
     given: dict[str, Grasp | None] = {}
@@ -77,6 +78,12 @@ def plan(options: Namespace) -> int:
                 one.to_json(path)
     if options.plot:
         _save_picture(found.plot, options.plot)
+    if options.gif:
+        with _writing(options.gif):
+            found.to_gif(options.gif)
+    if options.html:
+        with _writing(options.html):
+            found.to_html(options.html)
     return 0
 
 
@@ -136,11 +143,11 @@ def _built(
 
 def graph(options: Namespace) -> int:
     """Print the summary of one or several graphs."""
-    _check_outputs(options.file, options.save, options.certificates)
-    polygons = _polygons(options.file, options.name)
+    _check_outputs(options.file, options.save, options.certificates, options.html)
+    polygons = _polygons(options)
     if options.certificates:
         check_provable(options.switching, options.min_margin, hand_of(options))
-    for option in ("save", "certificates"):
+    for option in ("save", "certificates", "html"):
         if getattr(options, option) and len(polygons) > 1:
             several = _several(options.file, polygons)
             raise OptionError(f"--{option} takes one graph, but {several}")
@@ -159,6 +166,9 @@ def graph(options: Namespace) -> int:
         if options.certificates:
             with _writing(options.certificates):
                 built.save_certificates(options.certificates)
+        if options.html:
+            with _writing(options.html):
+                built.to_html(options.html)
     return 0
 
 
@@ -208,7 +218,7 @@ def _table_format(options: Namespace) -> str:
 def show(options: Namespace) -> int:
     """Draw an object with its edge numbers, or list them."""
     _check_outputs(options.file, options.plot)
-    polygon = _one_polygon(options.file, options.name)
+    polygon = _one_polygon(options)
     print(_description(polygon))
     if options.list:
         print()
@@ -246,8 +256,8 @@ def check(options: Namespace) -> int:
 # --- objects ------------------------------------------------------------------------------------
 
 
-def _polygons(file: str, name: str | None) -> list[Polygon]:
-    polygons = regrasp_lp.read_polygons(file)
+def _polygons(options: Namespace) -> list[Polygon]:
+    polygons, name = polygons_of(options), options.name
     if name is None:
         return polygons
     chosen = [polygon for polygon in polygons if polygon.name == name]
@@ -258,13 +268,13 @@ def _polygons(file: str, name: str | None) -> list[Polygon]:
     near = difflib.get_close_matches(name.casefold(), folded, n=5, cutoff=0.5)
     close = [folded[one] for one in near]
     listed = _listed([*close, *(one for one in names if one not in close)])
-    raise OptionError(f"{file} has no polygon named {name!r}; it has {listed}")
+    raise OptionError(f"{options.file} has no polygon named {name!r}; it has {listed}")
 
 
-def _one_polygon(file: str, name: str | None) -> Polygon:
-    polygons = _polygons(file, name)
+def _one_polygon(options: Namespace) -> Polygon:
+    polygons = _polygons(options)
     if len(polygons) > 1:
-        raise OptionError(_several(file, polygons))
+        raise OptionError(_several(options.file, polygons))
     return polygons[0]
 
 
@@ -363,7 +373,7 @@ def _check_outputs(source: str | Path, *outputs: Path | None) -> None:
             raise OptionError(f"{path} is the file that is read; write to another one")
         if path.resolve() in [other.resolve() for other in paths[:number]]:
             raise OptionError(f"{path} cannot be written twice")
-        if path.suffix.lower() in PICTURES:
+        if path.suffix.lower() in (*PICTURES, ANIMATION):
             import regrasp_lp.plotting  # noqa: F401  (says what to install if it cannot draw)
 
 

@@ -10,6 +10,7 @@ from regrasp_lp.cli.values import grasp, grasp_text
 from regrasp_lp.contact import Grasp
 from regrasp_lp.errors import ContactError, NoPlanFound
 from regrasp_lp.friction import IntArray
+from regrasp_lp.planning.fingers import Fingers
 from regrasp_lp.planning.search import placements_from
 from regrasp_lp.quality import margin
 from regrasp_lp.switches import SwitchesOnDemand
@@ -52,7 +53,7 @@ def far_apart(
     if goal is not None:
         # The way back places as many fingers, but for those that the two ends differ by.
         fewer = graph.sets.contacts
-        return chosen_grasp(graph, _farthest(graph, graph.locate(goal), fewer)), goal
+        return _held(graph, _farthest(graph, graph.locate(goal), fewer)), goal
     if not len(graph):
         raise NoPlanFound("no plan exists: the object has no grasp set at this friction")
     first = _farthest(graph, [_beginning(graph)])
@@ -61,26 +62,48 @@ def far_apart(
         raise NoPlanFound(
             "no two grasp sets are joined, so that none are far apart: give start and goal"
         )
-    return chosen_grasp(graph, first), chosen_grasp(graph, second)
+    return _held(graph, first), chosen_grasp(graph, second)
+
+
+def _held(graph: SwitchingGraph, index: int) -> Grasp:
+    """A good grasp of a set as a start: where fingers differ, with fingers that may be there."""
+    found = chosen_grasp(graph, index)
+    if len(graph.hand.groups) == 1:
+        return found
+    resolved = graph.polygon.resolve(found)
+    groups = Fingers(graph.sets, graph.hand)
+    free = [list(group) for group in graph.hand.groups]
+    order = next(
+        chosen
+        for number, chosen in graph.sets.holding(resolved)
+        if number == index and len(chosen) == len(resolved)
+    )
+    fingers = [free[group].pop(0) for group in groups.groups(index).tolist()]
+    by_contact = dict(zip(order, fingers, strict=True))
+    return Grasp(found.contacts, [by_contact[i] for i in range(len(found))])
 
 
 def _beginning(graph: SwitchingGraph) -> int:
     """Return a set from which to look for a far one."""
     if isinstance(graph.switches, SwitchesOnDemand):
         return int(graph.sets.margins.argmax())  # to find the components would take long
-    return min(graph.components()[0])
+    passable = Fingers(graph.sets, graph.hand).passable(Grasp([]))
+    first = graph.components()[0]
+    return min(first if passable is None else first & set(np.flatnonzero(passable)) or first)
 
 
 def _farthest(graph: SwitchingGraph, sources: Iterable[int], fewer: IntArray | None = None) -> int:
     """Return the set that needs most placements from the sources, less `fewer` of each set."""
     sets = graph.sets
     most = _LOOK_AT if isinstance(graph.switches, SwitchesOnDemand) else None
+    passable = Fingers(sets, graph.hand).passable(Grasp([]))
+    margins = sets.margins if passable is None else np.where(passable, sets.margins, -np.inf)
     found = placements_from(
-        sets.contacts, sets.margins, graph.switches, graph.hand, dict.fromkeys(sources, 0), most
+        sets.contacts, margins, graph.switches, graph.hand, dict.fromkeys(sources, 0), most
     )
     reached = np.flatnonzero(found >= 0)
     far = found[reached] if fewer is None else (found - fewer)[reached]
-    margins = np.round(sets.margins[reached] / graph.polygon.diameter, 6)
+    margins = np.round(margins[reached] / graph.polygon.diameter, 6)
     return int(reached[np.lexsort((reached, -margins, -far))[0]])
 
 

@@ -14,6 +14,11 @@ _LENGTHS = (
     ("--fingertip-separation", 0.0, "smallest distance between two touching fingers"),
 )
 
+_MOVES = (
+    ("--only-place", "may not slide"),
+    ("--only-slide", "may not be placed or released"),
+)
+
 
 def add_hand(group: Any) -> None:
     """Add the options to a group of a parser."""
@@ -39,6 +44,22 @@ def add_hand(group: Any) -> None:
         metavar="EDGES",
         help="edges that may not be touched: their numbers, separated by commas",
     )
+    group.add_argument(
+        "--finger-avoids",
+        type=values.finger_edges,
+        action="append",
+        default=[],
+        metavar="F:EDGES",
+        help="edges that one finger may not touch, as in 1:3,4; may be given for several fingers",
+    )
+    for option, what in _MOVES:
+        group.add_argument(
+            option,
+            type=values.finger_numbers,
+            default=[],
+            metavar="FINGERS",
+            help=f"fingers that {what}: their numbers, separated by commas",
+        )
 
 
 def hand_of(options: Namespace) -> Hand:
@@ -55,4 +76,7 @@ def hand_of(options: Namespace) -> Hand:
         options.edge_clearance,
         options.fingertip_separation,
         dict.fromkeys(options.avoid_edges),
+        [(finger, dict.fromkeys(edges)) for finger, edges in options.finger_avoids],
+        options.only_place,
+        options.only_slide,
     )

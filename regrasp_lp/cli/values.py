@@ -12,6 +12,7 @@ from regrasp_lp.errors import OptionError
 from regrasp_lp.planning.objective import Objective
 
 PICTURES = (".png", ".svg", ".pdf")
+ANIMATION = ".gif"
 
 
 def grasp_text(grasp: Grasp, digits: int | None = None) -> str:
@@ -24,22 +25,28 @@ def grasp_text(grasp: Grasp, digits: int | None = None) -> str:
     >>> grasp_text(Grasp([(4, 0.25), (0, 1 / 3)]), digits=4)
     '4:0.25,0:0.3333'
     """
-    pairs = zip(grasp.edges.tolist(), grasp.positions.tolist(), strict=True)
+    named = [""] * len(grasp) if grasp.fingers is None else [f"{k}@" for k in grasp.fingers]
+    entries = zip(named, grasp.edges.tolist(), grasp.positions.tolist(), strict=True)
     return ",".join(
-        f"{edge}:" + (repr(u).removesuffix(".0") if digits is None else f"{u:.{digits}g}")
-        for edge, u in pairs
+        f"{name}{edge}:" + (repr(u).removesuffix(".0") if digits is None else f"{u:.{digits}g}")
+        for name, edge, u in entries
     )
 
 
 def grasp(text: str) -> Grasp:
-    """Read contacts: pairs edge:position, separated by commas.
+    """Read contacts: pairs edge:position, separated by commas; each with its finger or none.
 
     Examples
     --------
-    >>> grasp("4:0.25, 0:1.2")
-    Grasp([(4, 0.25), (0, 1.2)])
+    >>> grasp("4:0.25, 0:1.2"), grasp("3@4:0.25, 1@0:1.2")
+    (Grasp([(4, 0.25), (0, 1.2)]), Grasp([(4, 0.25), (0, 1.2)], fingers=(3, 1)))
     """
-    return Grasp([_contact(pair.strip()) for pair in text.split(",")])
+    entries = [pair.strip().rpartition("@") for pair in text.split(",")]
+    contacts = [_contact(pair) for _, _, pair in entries]
+    if not any(at for _, at, _ in entries):
+        return Grasp(contacts)
+    fingers = [_whole(finger) for finger, _, _ in entries]
+    return Grasp(contacts, [0 if finger is None else finger for finger in fingers])
 
 
 def points(text: str) -> list[tuple[float, float]]:
@@ -120,6 +127,39 @@ def edge_numbers(text: str) -> list[int]:
     return [number for number in numbers if number is not None]
 
 
+def finger_numbers(text: str) -> list[int]:
+    """Read numbers of fingers, separated by commas.
+
+    Examples
+    --------
+    >>> finger_numbers("1, 4")
+    [1, 4]
+    """
+    numbers = [_whole(part) for part in text.split(",")]
+    if None in numbers:
+        raise argparse.ArgumentTypeError(
+            f"{text!r} does not name fingers; write their numbers separated by commas, as in 1,4"
+        )
+    return [number for number in numbers if number is not None]
+
+
+def finger_edges(text: str) -> tuple[int, list[int]]:
+    """Read the number of a finger and numbers of edges.
+
+    Examples
+    --------
+    >>> finger_edges("1:3,4")
+    (1, [3, 4])
+    """
+    finger, colon, named = text.partition(":")
+    number = _whole(finger)
+    if number is None or not colon:
+        raise argparse.ArgumentTypeError(
+            f"{text!r} does not name a finger and edges; write them as in 1:3,4"
+        )
+    return number, edge_numbers(named)
+
+
 def jobs(text: str) -> int:
     """Read a number of processes, 1 or more."""
     number = _whole(text)
@@ -191,6 +231,14 @@ def picture_file(text: str) -> Path:
             f"{text!r} has no suffix of a picture that can be written; use one of "
             + ", ".join(PICTURES)
         )
+    return path
+
+
+def animation_file(text: str) -> Path:
+    """Read the name of an animation to write."""
+    path = output_file(text)
+    if path.suffix.lower() != ANIMATION:
+        raise argparse.ArgumentTypeError(f"{text!r} has to end in {ANIMATION}")
     return path
 
 

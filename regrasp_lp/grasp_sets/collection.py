@@ -13,9 +13,8 @@ import numpy as np
 from regrasp_lp.contact import Contact, Grasp
 from regrasp_lp.friction import Cones, FloatArray, IntArray
 from regrasp_lp.grasp_sets.grasp_set import GraspSet as GraspSet
-from regrasp_lp.grasp_sets.grasp_set import slot_order
 from regrasp_lp.grasp_sets.set_pieces import SetPieces
-from regrasp_lp.grasp_sets.spacing import Alternatives, Spacing
+from regrasp_lp.grasp_sets.spacing import Alternatives, Spacing, assignments
 from regrasp_lp.grasp_sets.vertices import Family
 from regrasp_lp.polygon import Polygon
 from regrasp_lp.torque import TorqueFunctions
@@ -188,28 +187,35 @@ class GraspSets(Sequence[GraspSet]):
         """Return the numbers of all sets over a combination of edges, ascending."""
         return sorted(self._by_edges.get(tuple(sorted(edges)), ()))
 
-    def holding(self, grasp: Grasp) -> list[tuple[int, tuple[int, ...]]]:
+    def holding(
+        self, grasp: Grasp, group: IntArray | None = None
+    ) -> list[tuple[int, tuple[int, ...]]]:
         """Return the sets that contain a grasp, or some of its contacts, strictly and exactly.
 
         Parameters
         ----------
         grasp : Grasp
             Resolved.
+        group : numpy.ndarray of int, optional
+            Of which group the finger of each contact is (`Cones.group`); by default, all different
+            fingers that may touch there are tried.
 
         Returns
         -------
         list of (int, tuple of int)
             A set, and which contacts of the grasp are its contacts, in its order. Ascending.
         """
-        order = slot_order(grasp)
-        segments, fractions = self.cones.places(grasp.edges, grasp.fractions)
-        found = []
+        sizes = () if self.spacing is None else self.spacing.sizes
+        found = set()
         for count in range(2, len(grasp) + 1):
-            for chosen in combinations(order.tolist(), count):
-                key = tuple(segments[list(chosen)].tolist())
-                for index in self._by_segments.get(key, ()):
-                    if self._contain(index, fractions[list(chosen)]):
-                        found.append((index, tuple(chosen)))
+            for some in map(list, combinations(range(len(grasp)), count)):
+                places = grasp.edges[some], grasp.fractions[some]
+                of = None if group is None else group[some]
+                for segments, fractions in assignments(self.cones, sizes, *places, of):
+                    order = np.lexsort((fractions, segments))
+                    for index in self._by_segments.get(tuple(segments[order].tolist()), ()):
+                        if self._contain(index, fractions[order]):
+                            found.add((index, tuple(some[n] for n in order)))
         return sorted(found)
 
     def _contain(self, index: int, fractions: FloatArray) -> bool:

@@ -2,15 +2,19 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
+from itertools import permutations
+from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike
 
 from regrasp_lp.contact import Grasp
+from regrasp_lp.display import Pictured
 from regrasp_lp.errors import OptionError
-from regrasp_lp.friction import FloatArray, IntArray
+from regrasp_lp.friction import FloatArray
 from regrasp_lp.grasp_sets.double_cones import double_cones
 from regrasp_lp.grasp_sets.focus import focus_cell, independent_regions
 from regrasp_lp.grasp_sets.parallel import common_cone_rays, outer_regions, subpolytopes
@@ -23,7 +27,7 @@ from regrasp_lp.torque import TorqueFunctions
 
 
 @dataclass(frozen=True, eq=False)
-class GraspSet:
+class GraspSet(Pictured):
     """All force-closure grasps of one kind on one combination of edges.
 
     A vertex of the switching graph: connected, and the union of the convex `pieces`.
@@ -75,7 +79,29 @@ class GraspSet:
             sets = self.limited.linear(self.names)
         else:
             sets = piece_sets(self.torque, existing_pieces(self.torque), self.names)
-        return _in_order(self._in_positions(sets), self.edges)
+        return _in_order(self._in_positions(sets), self.torque.edges[0].tolist())
+
+    @cached_property
+    def spans(self) -> FloatArray:
+        """First and last position that each contact has in grasps of the set, shape (m, 2).
+
+        All positions between them occur, each with some positions of the others: u_i does iff
+        ``min_j M_j < 0`` where the others are 0 and ``max_k M_k > 0`` where they are at their
+        ends. Limits to the distance between fingers are not counted.
+        """
+        m, spans = self.torque.m, np.empty((self.torque.m, 2))
+        for i in range(m):
+            unit = np.eye(m)[i]
+            with np.errstate(divide="ignore", invalid="ignore"):
+                first, then = (self.torque.values(1 - unit * t)[0] for t in (1, 0))
+                lows = np.where(first > 0, 0.0, np.where(then > 0, first / (first - then), np.inf))
+                first, then = (self.torque.values(unit * t)[0] for t in (0, 1))
+                highs = np.where(
+                    then < 0, 1.0, np.where(first < 0, first / (first - then), -np.inf)
+                )
+            spans[i] = lows.min(), highs.max()
+        spans *= self.torque.lengths[0][:, None]
+        return np.asarray(spans + self.torque.first_positions[0][:, None])
 
     def _in_positions(self, sets: LinearSets) -> LinearSets:
         """Sets over fractions of the contacts, and more, as sets over positions along edges."""
@@ -199,15 +225,27 @@ class GraspSet:
     def _others(self) -> list[int]:
         return [edge for edge in self.edges if edge != self.center]
 
+    def plot(self, ax: Any = None) -> Any:
+        """Draw the set on its object; see `regrasp_lp.plotting.plot_grasp_set`."""
+        from regrasp_lp.plotting import plot_grasp_set
+
+        return plot_grasp_set(self, ax)
+
     def __contains__(self, grasp: object) -> bool:
         """Whether a grasp on exactly these edges is strictly inside, decided exactly."""
         if not isinstance(grasp, Grasp):
             return False
         resolved = self.polygon.resolve(grasp)
-        order = slot_order(resolved)
-        edges, fractions = resolved.edges[order], resolved.fractions[order]
-        segments, fractions = self.torque.cones.places(edges, fractions)
-        if segments.tolist() != self.torque.edges[0].tolist():
+        if len(resolved) != self.torque.m:
+            return False
+        return any(self._holds(resolved, order) for order in permutations(range(len(resolved))))
+
+    def _holds(self, grasp: Grasp, order: tuple[int, ...]) -> bool:
+        """Whether the contacts of a grasp, in some order, are inside."""
+        cones, mine = self.torque.cones, self.torque.edges[0]
+        edges, fractions = grasp.edges[list(order)], grasp.fractions[list(order)]
+        segments, fractions = cones.places(edges, fractions, cones.group[mine])
+        if segments.tolist() != mine.tolist():
             return False
         if self.limited is not None:
             return bool(self.limited.contain(fractions).any())
@@ -218,14 +256,9 @@ class GraspSet:
         return f"<GraspSet {self.kind} on edges {self.edges}{center}, margin {self.margin:.4g}>"
 
 
-def slot_order(grasp: Grasp) -> IntArray:
-    """Return the order of a grasp's contacts by edge and then along it, as sets have them."""
-    return np.lexsort((grasp.fractions, grasp.edges))
-
-
-def _in_order(sets: LinearSets, edges: tuple[int, ...]) -> LinearSets:
-    """Add ``u_i - u_{i+1} <= 0`` where two contacts are on one edge."""
-    rows = order_rows(edges)
+def _in_order(sets: LinearSets, segments: Sequence[int]) -> LinearSets:
+    """Add ``u_i - u_{i+1} <= 0`` where two contacts are on one edge (or segment)."""
+    rows = order_rows(segments)
     if not len(rows):
         return sets
     zeros = np.zeros((len(sets), len(rows)))

@@ -84,11 +84,14 @@ class Spacing:
         Largest distance, if there is one.
     separation : float
         Smallest distance.
+    sizes : tuple of int, optional
+        How many fingers there are of each group of `cones`, if they differ.
     """
 
     cones: Cones
     max_span: float | None
     separation: float
+    sizes: tuple[int, ...] = ()
     _known: dict[tuple[int, int], PairRows] = field(default_factory=dict, repr=False)
 
     def alternatives(
@@ -109,9 +112,11 @@ class Spacing:
         -------
         Alternatives
             Over the fractions of the n contacts; one without rows if nothing is limited, none if
-            two contacts can never be near or far enough.
+            two contacts can never be near or far enough, or there are not so many fingers.
         """
         n = len(segments)
+        if not self._enough(segments):
+            return Alternatives(np.zeros((0, 0, n)), np.zeros((0, 0)))
         always: list[tuple[FloatArray, float]] = []
         choices: list[list[tuple[FloatArray, float]]] = []
         for i, j in pairs:
@@ -132,6 +137,13 @@ class Spacing:
             np.array([[row for row, _ in rows] for rows in every]).reshape(len(every), -1, n),
             np.array([[bound for _, bound in rows] for rows in every]).reshape(len(every), -1),
         )
+
+    def _enough(self, segments: IntArray) -> bool:
+        """Whether there are different fingers for contacts on segments."""
+        if len(self.sizes) < 2:
+            return True
+        needed = np.bincount(self.cones.group[segments], minlength=len(self.sizes))
+        return bool((needed <= self.sizes).all())
 
     def between(self, first: int, second: int) -> PairRows:
         """Return the limits of two contacts on given segments."""
@@ -156,8 +168,10 @@ class Spacing:
                 return PairRows(_NONE, _NONE, possible=False)
             normals = normals[along.max(axis=1) > reach]
             always = np.column_stack((normals @ a, -normals @ b, reach - normals @ start))
+        # Fingers that may reach different parts of one edge have to pass each other nowhere.
+        passing = one_line and cones.group[first] != cones.group[second]
         least = self.separation + slack
-        if self.separation > 0 and self._nearest(first, second, start) < least:
+        if (self.separation > 0 or passing) and self._nearest(first, second, start) < least:
             normals = -_directions(a, 2 if one_line else SEPARATION_SIDES)
             normals = normals[(normals @ corners.T).max(axis=1) >= least]
             rows = np.column_stack((-normals @ a, normals @ b, normals @ start - least))
@@ -167,16 +181,54 @@ class Spacing:
         return PairRows(always, choices)
 
     def _nearest(self, first: int, second: int, start: FloatArray) -> float:
-        """Distance of two segments, which meet in their ends at most."""
-        if first == second:
-            return 0.0
-        a, b = self.cones.vectors[first], self.cones.vectors[second]
+        """Distance of two segments: of different edges they meet in their ends at most."""
+        cones = self.cones
+        if cones.edge[first] == cones.edge[second]:
+            apart = max(cones.lower[[first, second]]) - min(cones.upper[[first, second]])
+            return max(0.0, float(apart * cones.whole.lengths[cones.edge[first]]))
+        a, b = cones.vectors[first], cones.vectors[second]
         return min(
             _to_segment(start, b),  # the start of the first from the second, and its end
             _to_segment(start + a, b),
             _to_segment(-start, a),
             _to_segment(b - start, a),
         )
+
+
+def assignments(
+    cones: Cones,
+    sizes: Sequence[int],
+    edges: IntArray,
+    fractions: FloatArray,
+    group: IntArray | None = None,
+) -> list[tuple[IntArray, FloatArray]]:
+    """Return all ways to touch places on edges with different fingers.
+
+    Parameters
+    ----------
+    cones : Cones
+        Of all that fingers may touch.
+    sizes : sequence of int
+        How many fingers there are of each group; none if they do not differ.
+    edges, fractions : numpy.ndarray, shape (K,)
+    group : numpy.ndarray of int, shape (K,), optional
+        Which fingers are there; any by default.
+
+    Returns
+    -------
+    list of (numpy.ndarray of int, numpy.ndarray)
+        The segments, and the fractions of the edges as `Cones.places` returns them.
+    """
+    found = []
+    every = product(range(len(sizes) or 1), repeat=len(edges)) if group is None else [group]
+    for chosen in every:
+        groups = np.asarray(chosen, dtype=np.intp)
+        if sizes and (np.bincount(groups, minlength=len(sizes)) > sizes).any():
+            continue
+        segments, near = cones.places(edges, fractions, groups)
+        if (segments >= 0).all():
+            found.append((segments, near))
+    return found
 
 
 def admits(spacing: Spacing, points: FloatArray) -> BoolArray:
@@ -199,7 +251,7 @@ def admits(spacing: Spacing, points: FloatArray) -> BoolArray:
             distance = np.hypot(*np.moveaxis(points[:, i] - points[:, j], -1, 0))
             if spacing.max_span is not None:
                 result &= ~(distance > spacing.max_span * (1 - SPAN_ERROR) - slack)
-            if spacing.separation > 0:
+            if spacing.separation > 0 or spacing.sizes:
                 least = spacing.separation * (1 + SEPARATION_ERROR) + slack
                 result &= ~(distance < least)
     return result

@@ -94,6 +94,18 @@ def maximise_margins(
         If a number is not finite, a box is empty, or no row of a set has a positive scale.
     SolverError
         If some LP is still open; the message says what was tried, on how many, and the worst gap.
+
+    Examples
+    --------
+    The largest ε with ``x + ε <= 2`` and ``1 - x + ε <= 0`` in the box from 0 to 4.
+
+    >>> from regrasp_lp.lp.solver import get_solver
+    >>> sets = LinearSets(
+    ...     ("x",), np.array([[[1.0], [-1.0]]]), np.ones((1, 2)), np.array([[2.0, -1.0]]),
+    ...     np.zeros((1, 1)), np.full((1, 1), 4.0))
+    >>> found = maximise_margins(sets, get_solver("highs"))
+    >>> found.margins.round(6).tolist(), found.points.round(6).tolist()
+    ([0.5], [[1.5]])
     """
     _check(sets)
     parts = []

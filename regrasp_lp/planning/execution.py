@@ -7,6 +7,7 @@ from collections.abc import Iterable, Sequence
 from regrasp_lp.contact import Contact, Grasp
 from regrasp_lp.friction import FloatArray
 from regrasp_lp.grasp_sets.collection import GraspSets
+from regrasp_lp.planning.fingers import Fingers
 from regrasp_lp.planning.hand import Hand
 from regrasp_lp.planning.hops import Stop
 from regrasp_lp.planning.plan import Support
@@ -39,7 +40,8 @@ class Execution:
         index: int,
         given: Iterable[Contact] = (),
     ) -> None:
-        self._sets, self._hand, self._given = sets, hand, tuple(given)
+        self._sets, self._given = sets, tuple(given)
+        self._of_hand = Fingers(sets, hand)
         self._touching = dict(start)
         self._fingers = list(fingers)
         self._index = index
@@ -60,9 +62,6 @@ class Execution:
                 self._touching.update(moves)
         self.steps.append(step)
         self.supports.append(self._support())
-
-    def _free_finger(self) -> int:
-        return next(k for k in range(1, self._hand.fingers + 1) if k not in self._touching)
 
     def release_others(self) -> None:
         """Release every finger that is not part of the current set's grasp."""
@@ -85,7 +84,7 @@ class Execution:
         new = [contact for contact in stop.contacts if contact not in placed]
         leaving = sorted(k for k, contact in self._touching.items() if contact not in stop.contacts)
         for contact in new:
-            placed[contact] = self._free_finger()
+            placed[contact] = self._of_hand.free(self._touching)
             if contact == new[-1] and not leaving:
                 self._arrive(stop, placed)
             self._do(Place(placed[contact], contact))
@@ -99,6 +98,7 @@ class Execution:
     def switch(self, index: int, held: Sequence[tuple[int, int]], fractions: FloatArray) -> None:
         """Switch to another set: place its contacts that are not held, then release the others."""
         grasp = self._sets.grasp(index, fractions, self._given)
+        groups = self._of_hand.groups(index).tolist()
         fingers = [0] * len(grasp)
         for here, there in held:
             fingers[there] = self._fingers[here]
@@ -109,7 +109,7 @@ class Execution:
         new = [slot for slot, finger in enumerate(fingers) if finger == 0]
         leaving = sorted(set(self._fingers) - set(fingers))
         for slot in new:
-            fingers[slot] = self._free_finger()
+            fingers[slot] = self._of_hand.free(self._touching, groups[slot])
             if slot == new[-1] and not leaving:
                 self._fingers, self._index = fingers, index
             self._do(Place(fingers[slot], grasp[slot]))
@@ -147,6 +147,7 @@ class Execution:
     def place_others(self, goal: Grasp) -> None:
         """Place the contacts of the goal that are not part of the last set's grasp."""
         there = set(self._touching.values())
-        for contact in goal:
-            if contact not in there:
-                self._do(Place(self._free_finger(), contact))
+        some = [i for i, contact in enumerate(goal) if contact in there]
+        groups = self._of_hand.groups(self._index)
+        for contact, group in self._of_hand.placed(goal, some, groups) or ():
+            self._do(Place(self._of_hand.free(self._touching, group), contact))

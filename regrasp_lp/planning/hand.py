@@ -2,22 +2,29 @@
 
 from __future__ import annotations
 
-import math
-import numbers
 import operator
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, fields
-from typing import Any, TypeAlias
+from functools import cached_property
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from regrasp_lp.errors import HandError
-
-Intervals: TypeAlias = tuple[tuple[float, float], ...]
-"""Positions along an edge, ascending, with no point in common."""
-
-ReachableLike: TypeAlias = Mapping[int, Any] | Iterable[tuple[int, Any]] | None
+from regrasp_lp.planning.touching import (
+    ByFinger,
+    Intervals,
+    Reach,
+    ReachableLike,
+    finger_numbers,
+    finite_number,
+    intervals_by_edge,
+    reach_by_finger,
+    reach_entries,
+    reach_from,
+    shared_intervals,
+)
 
 
 @dataclass(frozen=True, repr=False)
@@ -41,6 +48,14 @@ class Hand:
         Of some edges the positions that may be touched, ends included: None or nothing for an edge
         that may not be touched. What is beyond the end of an edge is cut off. Edges that are not
         named may be touched everywhere. Kept as a tuple of (edge, intervals).
+    finger_reachable : mapping of int to such a mapping, optional
+        The same of single fingers, in addition to `reachable`. Kept as a tuple of (finger, what
+        `reachable` is kept as).
+    only_place : iterable of int
+        Fingers that do not slide: while they touch, they stay where they are.
+    only_slide : iterable of int
+        Fingers that are neither placed nor released: those that touch at the start slide along
+        their edge and are always among the fingers that support the object; the others are idle.
 
     Raises
     ------
@@ -53,6 +68,8 @@ class Hand:
     (2, 1, 0)
     >>> Hand(edge_clearance=2.5, reachable={3: None, 0: (5, 20)})
     Hand(fingers=4, edge_clearance=2.5, reachable=((0, ((5.0, 20.0),)), (3, ())))
+    >>> Hand(finger_reachable={1: {0: None}, 2: {0: None}}, only_place=[4]).groups
+    ((1, 2), (3,), (4,))
     """
 
     fingers: int = 4
@@ -60,6 +77,9 @@ class Hand:
     edge_clearance: float = 0.0
     fingertip_separation: float = 0.0
     reachable: ReachableLike = None
+    finger_reachable: ByFinger = ()
+    only_place: Iterable[int] = ()
+    only_slide: Iterable[int] = ()
 
     def __post_init__(self) -> None:
         try:
@@ -83,15 +103,45 @@ class Hand:
             "max_span": span,
             "edge_clearance": _length("edge_clearance", self.edge_clearance),
             "fingertip_separation": separation,
-            "reachable": _intervals_by_edge(self.reachable),
+            "reachable": intervals_by_edge(self.reachable),
+            "finger_reachable": reach_by_finger(self.finger_reachable, fingers),
+            "only_place": finger_numbers("only_place", self.only_place, fingers),
+            "only_slide": finger_numbers("only_slide", self.only_slide, fingers),
         }
         for name, value in normal.items():
             object.__setattr__(self, name, value)
+        for finger in self._placed:
+            if finger in self._slid:
+                raise HandError(
+                    f"finger {finger} is in only_place and in only_slide: it could not move at all"
+                )
+
+    @property
+    def _reach_of_fingers(self) -> tuple[tuple[int, Reach], ...]:
+        return self.finger_reachable  # type: ignore[return-value]  # as kept by __post_init__
+
+    @property
+    def _placed(self) -> tuple[int, ...]:
+        return self.only_place  # type: ignore[return-value]
+
+    @property
+    def _slid(self) -> tuple[int, ...]:
+        return self.only_slide  # type: ignore[return-value]
 
     @property
     def intervals(self) -> dict[int, Intervals]:
-        """The positions that may be touched, of the edges that `reachable` names."""
+        """The positions that any finger may touch, of the edges that `reachable` names."""
         return dict(self.reachable or ())
+
+    def intervals_of(self, finger: int) -> dict[int, Intervals]:
+        """Return the positions that a finger may touch, of the edges that are named for it.
+
+        Those of `reachable` that it may touch, too.
+        """
+        common = self.intervals
+        for edge, own in dict(self._reach_of_fingers).get(finger, ()):
+            common[edge] = shared_intervals(common[edge], own) if edge in common else own
+        return common
 
     @property
     def limited(self) -> bool:
@@ -103,13 +153,44 @@ class Hand:
         """Whether there are limits to the distance between two fingers."""
         return self.max_span is not None or self.fingertip_separation > 0
 
+    @cached_property
+    def groups(self) -> tuple[tuple[int, ...], ...]:
+        """The fingers, those with the same limits together; groups by their first fingers."""
+        reach = dict(self._reach_of_fingers)
+        found: dict[object, list[int]] = {}
+        for finger in range(1, self.fingers + 1):
+            limits = reach.get(finger), finger in self._placed, finger in self._slid
+            found.setdefault(limits, []).append(finger)
+        return tuple(map(tuple, found.values()))
+
+    def group_of(self, finger: int) -> int:
+        """Return the number of the group of a finger."""
+        return next(n for n, group in enumerate(self.groups) if finger in group)
+
+    def placed_only(self, group: int) -> bool:
+        """Whether the fingers of a group do not slide."""
+        return self.groups[group][0] in self._placed
+
+    def slid_only(self, group: int) -> bool:
+        """Whether the fingers of a group are neither placed nor released."""
+        return self.groups[group][0] in self._slid
+
+    @property
+    def coupled(self) -> bool:
+        """Whether limits tie fingers or grasps to each other, and do not only shorten edges.
+
+        Distances between fingers, fingers with limits of their own, fingers that do not slide or
+        that are not placed.
+        """
+        return self.spaced or len(self.groups) > 1 or bool(self._placed or self._slid)
+
     @property
     def adjacent(self) -> NDArray[np.bool_]:
         """``adjacent[n, m]``: whether all grasps of so many contacts are, shape (4, 4).
 
-        There is none to hold, and no limit to the distance between the fingers of the two.
+        There is none to hold, and no limit that ties the fingers of the two.
         """
-        return np.asarray((self.needs == 0) & (not self.spaced))
+        return np.asarray((self.needs == 0) & (not self.coupled))
 
     def held(self, contacts: int, others: int) -> int:
         """Return how many contacts two grasps must share for a switch between them.
@@ -132,10 +213,15 @@ class Hand:
             if field.name == "fingers" or getattr(self, field.name) != field.default
         }
         if "reachable" in document:
-            document["reachable"] = [
-                {"edge": edge, "intervals": [list(interval) for interval in intervals]}
-                for edge, intervals in self.intervals.items()
+            document["reachable"] = reach_entries(self.intervals.items())
+        if "finger_reachable" in document:
+            document["finger_reachable"] = [
+                {"finger": finger, "reachable": reach_entries(reach)}
+                for finger, reach in self._reach_of_fingers
             ]
+        for name in ("only_place", "only_slide"):
+            if name in document:
+                document[name] = list(document[name])
         return document
 
     @classmethod
@@ -152,8 +238,12 @@ class Hand:
             raise HandError(f"a hand has no {', '.join(unknown)}")
         values = {"fingers": document["fingers"], **document}
         if "reachable" in values:
-            entries = values["reachable"]
-            values["reachable"] = [(entry["edge"], entry["intervals"]) for entry in entries]
+            values["reachable"] = reach_from(values["reachable"])
+        if "finger_reachable" in values:
+            values["finger_reachable"] = [
+                (entry["finger"], reach_from(entry["reachable"]))
+                for entry in values["finger_reachable"]
+            ]
         return cls(**values)
 
     def __repr__(self) -> str:
@@ -167,65 +257,8 @@ class Hand:
 
 def _length(name: str, value: object) -> float:
     """A finite length >= 0; `max_span` has to be more."""
-    number = _number(value)
+    number = finite_number(value)
     if number is None or number < 0 or (name == "max_span" and number == 0):
         least = "larger than 0" if name == "max_span" else "of at least 0"
         raise HandError(f"{name} must be a finite length {least}, got {value!r}")
     return number
-
-
-def _number(value: object) -> float | None:
-    if isinstance(value, (bool, np.bool_)) or not isinstance(value, numbers.Real):
-        return None
-    number = float(value)
-    return number + 0.0 if math.isfinite(number) else None
-
-
-def _intervals_by_edge(reachable: ReachableLike) -> tuple[tuple[int, Intervals], ...] | None:
-    """What may be touched in the form in which it is kept; None if nothing is said."""
-    if reachable is None:
-        return None
-    try:
-        entries = list(reachable.items() if isinstance(reachable, Mapping) else reachable)
-        pairs = [(edge, intervals) for edge, intervals in entries]
-    except (TypeError, ValueError) as error:
-        raise HandError(
-            "reachable must be a mapping from edges to the positions that may be touched, as in "
-            f"{{0: (0.2, 1.0), 3: None}}, got {reachable!r}"
-        ) from error
-    found: dict[int, Intervals] = {}
-    for edge, intervals in pairs:
-        if isinstance(edge, (bool, np.bool_)) or not isinstance(edge, numbers.Integral) or edge < 0:
-            raise HandError(f"reachable names edges by their numbers, from 0, not {edge!r}")
-        if int(edge) in found:
-            raise HandError(f"reachable names edge {edge} twice: give all its intervals at once")
-        found[int(edge)] = _intervals(int(edge), intervals)
-    return tuple(sorted(found.items())) or None
-
-
-def _intervals(edge: int, value: object) -> Intervals:
-    """One interval, several or none; those that overlap or touch become one."""
-    if value is None:
-        return ()
-    entries = list(value) if isinstance(value, Iterable) else [value]
-    if len(entries) == 2 and all(_number(entry) is not None for entry in entries):
-        entries = [entries]
-    merged: list[tuple[float, float]] = []
-    for low, high in sorted(_interval(edge, entry) for entry in entries):
-        if merged and low <= merged[-1][1]:
-            merged[-1] = (merged[-1][0], max(high, merged[-1][1]))
-        else:
-            merged.append((low, high))
-    return tuple(merged)
-
-
-def _interval(edge: int, entry: object) -> tuple[float, float]:
-    ends = list(entry) if isinstance(entry, Iterable) else []
-    if len(ends) == 2:
-        low, high = _number(ends[0]), _number(ends[1])
-        if low is not None and high is not None and 0 <= low < high:
-            return low, high
-    raise HandError(
-        f"reachable[{edge}] must be None, an interval of positions (first, last) with "
-        f"0 <= first < last, or several of them; got {entry!r}"
-    )

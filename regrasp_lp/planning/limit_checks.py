@@ -9,7 +9,14 @@ from __future__ import annotations
 from dataclasses import dataclass
 from fractions import Fraction
 
-from regrasp_lp.planning.plan_document import LimitsDocument, Place
+from regrasp_lp.planning.plan_document import (
+    LimitsDocument,
+    Place,
+    PlaceStep,
+    ReachDocument,
+    ReleaseStep,
+    SlideStep,
+)
 from regrasp_lp.polygon import Polygon
 
 Point = tuple[Fraction, Fraction]
@@ -30,12 +37,12 @@ class LimitChecks:
     polygon: Polygon
     limits: LimitsDocument
 
-    def at(self, place: Place) -> str | None:
-        """Check a contact (on an edge of the object, with a fraction in [0, 1])."""
-        return self.along(place, place)
+    def at(self, place: Place, finger: int | None = None) -> str | None:
+        """Check a contact (on an edge of the object, with a fraction in [0, 1]) of a finger."""
+        return self.along(place, place, finger)
 
-    def along(self, start: Place, end: Place) -> str | None:
-        """Check a slide along an edge."""
+    def along(self, start: Place, end: Place, finger: int | None = None) -> str | None:
+        """Check a slide of a finger along an edge; None stands for any finger."""
         edge, (low, high) = start[0], sorted((Fraction(start[1]), Fraction(end[1])))
         square, clear = self._square(edge), Fraction(self.limits.edge_clearance) ** 2
         if low**2 * square < clear or (1 - high) ** 2 * square < clear:
@@ -43,17 +50,53 @@ class LimitChecks:
                 f"is nearer than edge_clearance = {self.limits.edge_clearance!r} of the hand to an "
                 f"end of edge {edge}"
             )
-        intervals = self.limits.reachable.get(edge)
+        for who, name, reach in (
+            ("the hand", "reachable", self.limits.reachable),
+            (f"finger {finger}", "finger_reachable", self._reach_of(finger)),
+        ):
+            outside = self._outside(reach.get(edge), edge, low, high)
+            if outside is not None:
+                return f"{outside} {who} may not touch ({name})"
+        return None
+
+    def _reach_of(self, finger: int | None) -> ReachDocument:
+        return {} if finger is None else self.limits.finger_reachable.get(finger, {})
+
+    def _outside(
+        self,
+        intervals: tuple[tuple[float, float], ...] | None,
+        edge: int,
+        low: Fraction,
+        high: Fraction,
+    ) -> str | None:
+        """What is wrong with a part of an edge of which some intervals may be touched."""
         if intervals is None:
             return None
-        for first, last in intervals:
-            if low**2 * square >= Fraction(first) ** 2 and high**2 * square <= Fraction(last) ** 2:
-                return None
         if not intervals:
-            return f"is on edge {edge}, which the hand may not touch (reachable)"
-        if start != end and self.at(start) is None and self.at(end) is None:
-            return f"passes over a part of edge {edge} that the hand may not touch (reachable)"
-        return f"is on a part of edge {edge} that the hand may not touch (reachable)"
+            return f"is on edge {edge}, which"
+        square = self._square(edge)
+
+        def within(first: Fraction, last: Fraction) -> bool:
+            return any(
+                first**2 * square >= Fraction(a) ** 2 and last**2 * square <= Fraction(b) ** 2
+                for a, b in intervals
+            )
+
+        if within(low, high):
+            return None
+        if low != high and within(low, low) and within(high, high):
+            return f"passes over a part of edge {edge} that"
+        return f"is on a part of edge {edge} that"
+
+    def done_by(self, step: PlaceStep | ReleaseStep | SlideStep) -> str | None:
+        """Check that the fingers of a step may do it: some do not slide, others only do."""
+        if isinstance(step, SlideStep):
+            fingers, never = [move.finger for move in step.moves], self.limits.only_place
+            text = "may not slide (only_place)"
+        else:
+            fingers, never = [step.finger], self.limits.only_slide
+            text = "may not be placed or released (only_slide)"
+        return next((f"finger {finger} {text}" for finger in fingers if finger in never), None)
 
     def apart(self, vector: Point) -> str | None:
         """Check the vector from one touching finger to another."""

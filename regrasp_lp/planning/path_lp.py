@@ -16,6 +16,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from regrasp_lp.errors import SolverError
 from regrasp_lp.friction import FloatArray, IntArray
 from regrasp_lp.grasp_sets.pieces import Measure, piece_sets
 from regrasp_lp.grasp_sets.set_pieces import SetPieces
@@ -25,7 +26,10 @@ from regrasp_lp.torque import TorqueFunctions
 if TYPE_CHECKING:
     from scipy.sparse import csr_matrix
 
-_FINGERS_APART = 2.0
+_SAME = 1e-12
+"""Fractions that differ by no more are equal."""
+
+FINGERS_APART = 2.0
 """As `apart` of `piece_sets`: no two fingers meet, even if each is off by its tolerance."""
 
 
@@ -45,6 +49,8 @@ class Stage:
         piece, over "f0" to "f2": for slides from a given grasp and to one.
     limits : SetPieces, optional
         The same pieces with rows of limits of the hand, if there are any.
+    staying : tuple of int
+        The contacts that do not slide: in all grasps of the stage they are the same.
     """
 
     functions: TorqueFunctions
@@ -52,6 +58,7 @@ class Stage:
     entry: LinearSets | None = None
     exit: LinearSets | None = None
     limits: SetPieces | None = None
+    staying: tuple[int, ...] = ()
 
 
 @dataclass(frozen=True, eq=False)
@@ -111,7 +118,7 @@ def build_path_problem(
     start: FloatArray | None,
     goal: FloatArray | None,
     measure: Measure = "tolerance",
-    apart: float = _FINGERS_APART,
+    apart: float = FINGERS_APART,
     couplings: Sequence[LinearSets | None] = (),
 ) -> PathProblem:
     """Return the path LP of a chain of stages.
@@ -135,14 +142,14 @@ def build_path_problem(
     -------
     PathProblem
     """
-    variables, given = _number(stages, held, start, goal)
+    variables, given = number_variables(stages, held, start, goal)
     count = max((int(ids.max(initial=-1)) for ids in variables), default=-1) + 1
     size = stages[0].functions.cones.size
-    builder, travel = _Rows(count), _Rows(count)
+    builder, travel = SparseRows(count), SparseRows(count)
     owners: list[int] = []
     first = 0
     for t, (stage, ids, fixed) in enumerate(zip(stages, variables, given, strict=True)):
-        cells = _cells(stage, measure, apart)
+        cells = stage_cells(stage, measure, apart)
         known = np.where(ids < 0, fixed, 0.0)
         last = len(ids) - 1
         for node in range(last + 1):
@@ -160,8 +167,8 @@ def build_path_problem(
             # Around a corner, fingers that leave and fingers that come may meet.
             columns = np.concatenate((variables[t - 1][-1], ids[0]))
             values = np.concatenate((given[t - 1][-1], fixed[0]))
-            rows = [(*r, apart) for r in round_corners(stages[t - 1], stage, held[t - 1])]
-            rows += _coupled(couplings[t - 1] if couplings else None, stages[t - 1], held[t - 1])
+            coupling = couplings[t - 1] if couplings else None
+            rows = switch_rows(stages[t - 1], stage, held[t - 1], coupling, apart)
             for row, bound, scale in rows:
                 at = float(row @ np.where(columns < 0, values, 0.0))
                 if (columns[row != 0] >= 0).any():
@@ -184,6 +191,27 @@ def build_path_problem(
         travel.matrix(),
         np.array(travel.bounds),
     )
+
+
+def switch_rows(
+    stage: Stage,
+    after: Stage,
+    held: Sequence[tuple[int, int]],
+    coupling: LinearSets | None,
+    apart: float,
+) -> list[tuple[FloatArray, float, float]]:
+    """Return rows, bounds and scales over the fractions of both grasps of a switch.
+
+    Parameters
+    ----------
+    stage, after : Stage
+    held : sequence of (int, int)
+    coupling : LinearSets or None
+    apart : float
+        As for `build_path_problem`.
+    """
+    rows = [(*row, apart) for row in round_corners(stage, after, held)]
+    return rows + _coupled(coupling, stage, held)
 
 
 def round_corners(
@@ -226,8 +254,8 @@ def _coupled(
     return found
 
 
-def _cells(stage: Stage, measure: Measure, apart: float) -> list[LinearSets]:
-    """The convex set of each slide of a stage, as a stack of one."""
+def stage_cells(stage: Stage, measure: Measure, apart: float) -> list[LinearSets]:
+    """Return the convex set of each slide of a stage, as a stack of one."""
     names = [f"f{i}" for i in range(stage.functions.m)]
     if stage.limits is not None:
         cells = list(stage.limits.linear(names, measure=measure, apart=apart))
@@ -240,13 +268,22 @@ def _cells(stage: Stage, measure: Measure, apart: float) -> list[LinearSets]:
     return cells
 
 
-def _number(
+def number_variables(
     stages: Sequence[Stage],
     held: Sequence[Sequence[tuple[int, int]]],
     start: FloatArray | None,
     goal: FloatArray | None,
 ) -> tuple[list[IntArray], list[FloatArray]]:
-    """Number the variables; held contacts are one variable on both sides of a switch."""
+    """Number the variables of a path, as `PathProblem` has them.
+
+    Held contacts are one variable on both sides of a switch, and so are in all grasps of a stage
+    the contacts that do not slide.
+
+    Raises
+    ------
+    SolverError
+        If one that does not slide is to end elsewhere than where it begins.
+    """
     variables: list[IntArray] = []
     given: list[FloatArray] = []
     count = 0
@@ -260,11 +297,17 @@ def _number(
             ids[0, there] = variables[-1][-1, here]
             fixed[0, there] = given[-1][-1, here]
         new = ids == -2
+        new[1:, list(stage.staying)] = False
         ids[new] = count + np.arange(new.sum())
         count += int(new.sum())
+        for slot in stage.staying:
+            ids[1:, slot], fixed[1:, slot] = ids[0, slot], fixed[0, slot]
         variables.append(ids)
         given.append(fixed)
     if goal is not None:
+        here = given[-1][-1]
+        if (np.abs(here - goal) > _SAME).any():  # given at the start, but for those that are free
+            raise SolverError("a finger that does not slide is to end elsewhere than it began")
         # A stage of one grasp has it in common with the ones before, as far as it is held.
         for variable, fraction in zip(variables[-1][-1].tolist(), goal.tolist(), strict=True):
             for ids, fixed in zip(variables, given, strict=True):
@@ -278,8 +321,14 @@ def _number(
     return variables, given
 
 
-class _Rows:
-    """Collects sparse rows; columns of -1 are left out."""
+class SparseRows:
+    """Collects rows ``a x + δ s <= b`` of a sparse matrix; columns of -1 are left out.
+
+    Parameters
+    ----------
+    columns : int
+        How many there are.
+    """
 
     def __init__(self, columns: int) -> None:
         self.columns = columns

@@ -52,15 +52,16 @@ def path_sets(
     NotForceClosureError, ContactError, HandError
         If start or goal is not a grasp that can be held, or not in the first or the last set.
     HandError
-        If the hand limits distances between fingertips.
+        If the hand limits distances between fingertips, or single fingers.
     SolverError
         If a switch exists within rounding only.
     """
     sets, hand, solver = problem.sets, problem.hand, problem.solver
-    if hand.spaced:
+    if hand.coupled:
         raise HandError(
-            "path sets do not know limits between fingertips (max_span, fingertip_separation): "
-            "build the graph for a hand without them and state them as constraints on points()"
+            "path sets do not know limits between fingertips (max_span, fingertip_separation) or "
+            "of single fingers: build the graph for a hand without them and state them as "
+            "constraints on points()"
         )
     path = _checked(sets, nodes)
     switches = []

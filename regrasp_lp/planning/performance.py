@@ -14,6 +14,7 @@ from regrasp_lp.planning.execution import Execution
 from regrasp_lp.planning.hops import Stop, fewest_hops
 from regrasp_lp.planning.path_lp import Stage
 from regrasp_lp.planning.plan import Plan
+from regrasp_lp.planning.reach import start_fingers
 from regrasp_lp.planning.regrip import regrip_moves
 
 if TYPE_CHECKING:
@@ -65,8 +66,9 @@ def perform(
     SolverError
         If the plan does not pass its own exact check.
     """
-    fingers = {i + 1: contact for i, contact in enumerate(start)}
-    mine = [i + 1 for i in passage.chosen]
+    names = start_fingers(start)
+    fingers = dict(zip(names, start, strict=True))
+    mine = [names[i] for i in passage.chosen]
     given = (*start, *goal)
     run = Execution(problem.sets, problem.hand, fingers, mine, passage.path[0], given)
     if set(start) == set(goal):

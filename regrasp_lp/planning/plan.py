@@ -14,6 +14,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from regrasp_lp.contact import Contact, Grasp
+from regrasp_lp.display import plan_html
 from regrasp_lp.files import write_atomically
 from regrasp_lp.friction import Cones, FloatArray
 from regrasp_lp.planning.along import instants, least_margin_along, least_tolerance_along
@@ -165,7 +166,7 @@ class Plan:
         for i, (contacts, support) in enumerate(zip(self._touching, self.supports, strict=True)):
             functions, f = self.torques(contacts, support)
             margin, tolerance = float(functions.margins(f)[0]), float(functions.tolerances(f)[0])
-            tolerance = min(tolerance, room(self.touchable, self.hand, contacts.values()))
+            tolerance = min(tolerance, room(self.touchable, self.hand, contacts))
             held.append(HeldGrasp(i, contacts, support, margin, tolerance))
         return tuple(held)
 
@@ -196,7 +197,7 @@ class Plan:
                 least.append(np.inf)
                 continue
             passed = instants(self.polygon, *self._touching[i : i + 2])
-            left = (room(self.touchable, self.hand, contacts.values()) for contacts in passed)
+            left = (room(self.touchable, self.hand, contacts) for contacts in passed)
             least.append(min(least_tolerance_along(*slide), *left))
         return tuple(least)
 
@@ -368,6 +369,21 @@ class Plan:
             write_atomically(path, text)
         return text
 
+    def to_html(self, path: str | Path | None = None) -> str:
+        """Return a page to step through, and write it to `path` if given (`viewer.plan_page`)."""
+        from regrasp_lp.viewer import plan_page
+
+        return plan_page(self, path)
+
+    def to_gif(self, path: str | Path | None = None, **options: float) -> bytes:
+        """Return an animation, and write it to `path` if given (`plotting.plan_gif`)."""
+        from regrasp_lp.plotting import plan_gif
+
+        data = plan_gif(self, **options)
+        if path is not None:
+            write_atomically(path, data)
+        return data
+
     def __eq__(self, other: object) -> bool:
         """Whether two plans have the same file."""
         return self.to_document() == other.to_document() if isinstance(other, Plan) else False
@@ -379,6 +395,9 @@ class Plan:
         from regrasp_lp.planning.account import account
 
         return account(self)
+
+    def _repr_html_(self) -> str:
+        return plan_html(self)
 
     def __repr__(self) -> str:
         return (

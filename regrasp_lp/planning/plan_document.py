@@ -23,6 +23,10 @@ Place: TypeAlias = tuple[int, float]
 """An edge and a fraction of its length."""
 
 
+ReachDocument: TypeAlias = Mapping[int, tuple[tuple[float, float], ...]]
+"""Of some edges the intervals of positions that may be touched."""
+
+
 @dataclass(frozen=True)
 class PlaceStep:
     """A finger comes to a place; also how a contact of the start is said."""
@@ -61,7 +65,10 @@ class LimitsDocument:
     max_span: float | None
     edge_clearance: float
     fingertip_separation: float
-    reachable: Mapping[int, tuple[tuple[float, float], ...]]
+    reachable: ReachDocument
+    finger_reachable: Mapping[int, ReachDocument]
+    only_place: frozenset[int]
+    only_slide: frozenset[int]
 
 
 @dataclass(frozen=True)
@@ -151,16 +158,45 @@ def read_plan_document(path: str | os.PathLike[str]) -> dict[str, Any]:
 
 def _limits(hand: Mapping[str, Any]) -> LimitsDocument:
     lengths = ("max_span", "edge_clearance", "fingertip_separation")
-    unknown = sorted(set(hand) - {"fingers", *lengths, "reachable"})
+    fingers = ("finger_reachable", "only_place", "only_slide")
+    unknown = sorted(set(hand) - {"fingers", *lengths, "reachable", *fingers})
     if unknown:  # a limit that is not checked must not pass for one that holds
         raise FileFormatError(f"hand.{unknown[0]}: no limit of a hand that this release knows")
     given = {name: _number(hand[name], f"hand.{name}") for name in lengths if name in hand}
     for name, value in given.items():
         if value < 0:
             raise FileFormatError(f"hand.{name}: expected a length, found {value!r}")
+    by_finger: dict[int, ReachDocument] = {}
+    where = "hand.finger_reachable"
+    for i, item in enumerate(_sequence(hand.get("finger_reachable", []), where)):
+        entry = _mapping(item, f"{where}[{i}]")
+        finger = _integer(_entry(entry, "finger", f"{where}[{i}]."), f"{where}[{i}].finger")
+        if finger in by_finger:
+            raise FileFormatError(f"{where}[{i}].finger: finger {finger} is named twice")
+        reach = _entry(entry, "reachable", f"{where}[{i}].")
+        by_finger[finger] = _reach(reach, f"{where}[{i}].reachable")
+    placed, slid = (
+        frozenset(
+            _integer(finger, f"hand.{name}[{i}]")
+            for i, finger in enumerate(_sequence(hand.get(name, []), f"hand.{name}"))
+        )
+        for name in ("only_place", "only_slide")
+    )
+    return LimitsDocument(
+        given.get("max_span"),
+        given.get("edge_clearance", 0.0),
+        given.get("fingertip_separation", 0.0),
+        _reach(hand.get("reachable", []), "hand.reachable"),
+        by_finger,
+        placed,
+        slid,
+    )
+
+
+def _reach(value: object, name: str) -> ReachDocument:
     reachable: dict[int, tuple[tuple[float, float], ...]] = {}
-    for i, item in enumerate(_sequence(hand.get("reachable", []), "hand.reachable")):
-        where = f"hand.reachable[{i}]"
+    for i, item in enumerate(_sequence(value, name)):
+        where = f"{name}[{i}]"
         entry = _mapping(item, where)
         edge = _integer(_entry(entry, "edge", f"{where}."), f"{where}.edge")
         if edge in reachable:
@@ -172,12 +208,7 @@ def _limits(hand: Mapping[str, Any]) -> LimitsDocument:
                     f"{where}.intervals: expected 0 <= first <= last, found {[first, last]}"
                 )
         reachable[edge] = tuple(intervals)
-    return LimitsDocument(
-        given.get("max_span"),
-        given.get("edge_clearance", 0.0),
-        given.get("fingertip_separation", 0.0),
-        reachable,
-    )
+    return reachable
 
 
 def _start_contact(value: object, index: int) -> PlaceStep:

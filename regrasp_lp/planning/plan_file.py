@@ -63,6 +63,17 @@ def read_plan(path: str | Path) -> Plan:
     ------
     FileFormatError
         If the file is damaged, of another format or another version.
+
+    Examples
+    --------
+    >>> import tempfile
+    >>> from regrasp_lp import plan_regrasp
+    >>> block = Polygon([(0, 0), (6, 0), (6, 3), (0, 3)], name="block")
+    >>> plan = plan_regrasp(block, [(0, 3), (2, 3)], [(1, 1.5), (3, 1.5)], friction=0.4)
+    >>> with tempfile.TemporaryDirectory() as folder:
+    ...     _ = plan.to_json(Path(folder) / "plan.json")
+    ...     read_plan(Path(folder) / "plan.json") == plan
+    True
     """
     document = read_plan_document(path)
     try:
@@ -120,6 +131,14 @@ def check_plan(plan: Plan | str | Path) -> Report:
     Returns
     -------
     Report
+
+    Examples
+    --------
+    >>> from regrasp_lp import plan_regrasp
+    >>> block = Polygon([(0, 0), (6, 0), (6, 3), (0, 3)], name="block")
+    >>> plan = plan_regrasp(block, [(0, 3), (2, 3)], [(1, 1.5), (3, 1.5)], friction=0.4)
+    >>> print(check_plan(plan))
+    The plan is valid: 5 grasps and 0 slides checked, exactly.
     """
     document = plan.to_document() if isinstance(plan, Plan) else read_plan_document(plan)
     return verify_document(document)

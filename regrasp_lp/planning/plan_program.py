@@ -264,7 +264,7 @@ class PlanProgram:
 
     def _part(self, stay: int) -> tuple[float, float]:
         """From which to which fraction of its edge a finger may be."""
-        return touchable_part(self.plan, self.stays[stay].contact)
+        return touchable_part(self.plan, self.stays[stay].finger, self.stays[stay].contact)
 
     @property
     def free(self) -> list[int]:

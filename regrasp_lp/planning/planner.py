@@ -3,37 +3,41 @@
 from __future__ import annotations
 
 import logging
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass, replace
 from functools import cached_property, partial
-from itertools import islice, pairwise
+from itertools import islice
 
 import numpy as np
 
 from regrasp_lp.contact import Grasp
 from regrasp_lp.errors import HandError, NoPlanFound, SolverError
-from regrasp_lp.friction import FloatArray
+from regrasp_lp.friction import BoolArray, FloatArray
 from regrasp_lp.grasp_sets.collection import GraspSets
-from regrasp_lp.grasp_sets.set_pieces import with_rows
-from regrasp_lp.handovers import Handover, handovers
-from regrasp_lp.linear_sets import LinearSets
 from regrasp_lp.lp import Solver
-from regrasp_lp.planning.aligning import PieceChains
-from regrasp_lp.planning.alternatives import PATIENCE, distinct, in_order, merged, remembered
+from regrasp_lp.planning.alternatives import (
+    PATIENCE,
+    Alternative,
+    distinct,
+    in_order,
+    merged,
+    remembered,
+)
 from regrasp_lp.planning.bottleneck import Route
+from regrasp_lp.planning.clearing import clearing_search
 from regrasp_lp.planning.costs import Budget
 from regrasp_lp.planning.ends import supports
+from regrasp_lp.planning.fingers import Fingers
 from regrasp_lp.planning.hand import Hand
 from regrasp_lp.planning.levels import PieceRows
 from regrasp_lp.planning.moves import KnownMoves
 from regrasp_lp.planning.objective import PLACEMENTS, Objective
-from regrasp_lp.planning.path_lp import Stage, build_path_problem
-from regrasp_lp.planning.path_optimum import solve_path_problem
 from regrasp_lp.planning.performance import Passage, perform
 from regrasp_lp.planning.plan import Plan
 from regrasp_lp.planning.route_lp import Terminal
 from regrasp_lp.planning.search import PathSearch
+from regrasp_lp.planning.set_path import passage_along
 from regrasp_lp.planning.shortest import shortest_route
 from regrasp_lp.planning.steering import FREE, Steering
 from regrasp_lp.planning.widest import Widest, WidestProblem
@@ -108,10 +112,10 @@ class PlanningProblem:
         steering: Steering = FREE,
     ) -> Iterator[Plan]:
         """Yield verified plans along different paths of sets, the best first; raises as `plan`."""
-        if aligning == "regrip" and self.hand.spaced:
+        if aligning == "regrip" and self.hand.coupled:
             raise HandError(
-                "aligning by repositioning is not for a hand with max_span or "
-                'fingertip_separation: use aligning="slide"'
+                "aligning by repositioning is not for a hand with max_span, fingertip_separation "
+                'or limits of single fingers: use aligning="slide"'
             )
         if set(start) == set(goal):
             return iter([self._nothing_to_do(start, goal, objective)])
@@ -122,7 +126,7 @@ class PlanningProblem:
         return distinct(iter(self._cheapest(start, goal, aligning, objective, steering)))
 
     def _nothing_to_do(self, start: Grasp, goal: Grasp, objective: Objective) -> Plan:
-        index, chosen = self.sets.holding(start)[0]
+        index, chosen = Fingers(self.sets, self.hand).starts(start)[0]
         passage = Passage((index,), (), (self._fractions(index, start, chosen)[None],), chosen)
         plan = perform(self, passage, start, goal, "slide")
         return replace(plan, objective=objective, bound=objective.value(plan))
@@ -131,7 +135,14 @@ class PlanningProblem:
         self, start: Grasp, goal: Grasp, aligning: str, steering: Steering
     ) -> Iterator[Plan]:
         """The plans with the fewest placements."""
-        sources, targets = ends = dict(self._choices(start)), dict(self._choices(goal))
+        fingers = Fingers(self.sets, self.hand)
+        passable, through = fingers.passable(start), steering.through
+        if passable is not None:
+            through = passable if through is None else through & passable
+        sources, targets = ends = (
+            _first_choices(fingers.starts(start), passable),
+            _first_choices(fingers.goals(goal), passable),
+        )
         search = PathSearch(
             self.sets.contacts,
             self.sets.margins,
@@ -140,7 +151,7 @@ class PlanningProblem:
             dict.fromkeys(sources, 0),
             {i: len(goal) - len(chosen) for i, chosen in targets.items()},
             self._given((start, sources), (goal, targets)),
-            steering.through,
+            through,
             steering.weigh,
         )
         if search.first is None:
@@ -150,11 +161,33 @@ class PlanningProblem:
             # In two-finger sets more fingers are free, so that aligning there takes fewer.
             margins = np.where(self.sets.contacts == 3, -np.inf, self.sets.margins)
             searches.append(replace(search, margins=margins))
-        thin = self.sets.margins <= _THIN * self.sets.polygon.diameter
         make = partial(self._along, start=start, goal=goal, ends=ends, aligning=aligning)
+        runs = [self._in_order(each, make) for each in searches]
+        if self.hand.only_place:
+            clearing = clearing_search(search, fingers, start, goal)
+            runs = [self._clearing(clearing, make)]
         bound = None if steering.weigh else float(search.first[0][1])
-        for plan in merged(in_order(each, make, thin) for each in searches):
+        for plan in merged(runs):
             yield replace(plan, objective=PLACEMENTS, bound=bound)
+
+    def _in_order(
+        self, search: PathSearch, make: Callable[[tuple[int, ...]], Plan]
+    ) -> Iterator[Alternative]:
+        thin = search.margins <= _THIN * self.sets.polygon.diameter
+        return in_order(search, make, thin)
+
+    def _clearing(self, search: PathSearch, make: Callable[..., Plan]) -> Iterator[Alternative]:
+        """Plans of fingers that do not slide; where they tie too much together, holding less."""
+        if search.first is None:
+            raise SolverError(
+                "no path of sets is found along which the fingers that do not slide (only_place) "
+                "come off where they are and back elsewhere; this does not prove that there is none"
+            )
+        try:
+            yield from self._in_order(search, make)
+        except SolverError as failure:
+            _LOG.info("fewer contacts are held, because %s", failure)
+            yield from self._in_order(search, partial(make, few=True))
 
     def _along(
         self,
@@ -163,20 +196,14 @@ class PlanningProblem:
         goal: Grasp,
         ends: tuple[Choices, Choices],
         aligning: str,
+        few: bool = False,
     ) -> Plan:
-        """The verified plan along a path of sets."""
+        """The verified plan along a path of sets, or of nodes that stand for sets."""
+        path = tuple(node % len(self.sets) for node in path)
         first, last = ends[0][path[0]], ends[1][path[-1]]
         here = self._fractions(path[0], start, first)
         there = self._fractions(path[-1], goal, last)
-        switches = [self._handover(i, j) for i, j in pairwise(path)]
-        stages = self._stages(path, switches, here, there)
-        held = tuple(switch.slots for switch in switches)
-        couplings = [
-            self._coupling(i, j, s) for (i, j), s in zip(pairwise(path), switches, strict=True)
-        ]
-        problem = build_path_problem(stages, held, here, there, couplings=couplings)
-        grasps = solve_path_problem(problem, self.solver.name)
-        passage = Passage(path, held, tuple(grasps), first, tuple(stages))
+        passage = passage_along(self, path, first, here, there, few=few)
         return perform(self, passage, start, goal, aligning)
 
     def _widest(
@@ -189,7 +216,7 @@ class PlanningProblem:
         search = WidestProblem(rows, moves, self.hand, self.solver, first, last)
         routes = WidestRoutes(search, steering.through)
         found = replace(routes.best, bound=self._bound(routes.best, start, goal, objective))
-        if self.hand.spaced:
+        if self.hand.coupled:
             # Routes do not know of limits between fingers: these are bounds only.
             found = replace(found, route=None)
         grasps = [] if found.route is None else search.grasps(found.route)
@@ -197,7 +224,7 @@ class PlanningProblem:
         if best is None:
             return
         yield best
-        if self.hand.spaced:
+        if self.hand.coupled:
             return
         failed = 0
         for found in islice(routes.in_order(), 1, None):
@@ -236,7 +263,7 @@ class PlanningProblem:
         The one along the best route; and those with the fewest placements, by sliding and by
         repositioning, which takes no travel at all.
         """
-        if self.hand.spaced:
+        if self.hand.coupled:
             fewest = islice(self._fewest(start, goal, aligning, steering), 1)
             return [replace(plan, objective=objective, bound=None) for plan in fewest]
         starts = [replace(end, placed=0) for end in self._terminals(start)]
@@ -333,13 +360,6 @@ class PlanningProblem:
         """The contacts of a given grasp that a set holds, as fractions of what can be touched."""
         return self.sets.fractions(index, grasp.fractions[list(chosen)])
 
-    def _choices(self, grasp: Grasp) -> list[tuple[int, tuple[int, ...]]]:
-        """Sets that contain the grasp or two of its contacts; of each the first choice."""
-        choices: Choices = {}
-        for index, chosen in self.sets.holding(grasp):
-            choices.setdefault(index, chosen)
-        return sorted(choices.items())
-
     def _given(self, *ends: tuple[Grasp, Choices]) -> dict[int, float]:
         """Margin of the given contacts in each set that holds the start or the goal."""
         margins: dict[int, float] = {}
@@ -350,39 +370,14 @@ class PlanningProblem:
                 margins[index] = min(margin, margins.get(index, margin))
         return margins
 
-    def _handover(self, first: int, second: int) -> Handover:
-        """The best way to switch that holds as many contacts as possible."""
-        others, held = self.switches.neighbors(first)
-        found = held[others == second]
-        count = int(found[0]) if found.size else 0
-        return handovers(self.sets, self.solver, first, second, count)[0]
 
-    def _stages(
-        self, path: tuple[int, ...], switches: list[Handover], start: FloatArray, goal: FloatArray
-    ) -> list[Stage]:
-        """The chain of pieces through each set, from where it is entered to where it is left."""
-        arrivals = [start, *(switch.second for switch in switches)]
-        leavings = [*(switch.first for switch in switches), goal]
-        stages = []
-        for index, f, g in zip(path, arrivals, leavings, strict=True):
-            chains = PieceChains(self.sets.pieces(index), self.solver)
-            pieces, _ = chains.chain(f, g)
-            parts = chains.parts.take(np.array(pieces))
-            limits = parts if self.hand.spaced else None
-            stages.append(Stage(chains.functions, parts.pieces, limits=limits))
-        return stages
-
-    def _coupling(self, first: int, second: int, handover: Handover) -> LinearSets | None:
-        """What limits the distances between the fingers of both grasps of a switch."""
-        found = self.sets.coupled(first, second, handover.slots)
-        if found is None or handover.way is None:
-            return None
-        rows, bounds = found.rows[[handover.way]], found.bounds[[handover.way]]
-        n = rows.shape[2]
-        none, box = np.zeros((1, 0, n)), np.zeros((1, n))
-        names = tuple(f"x{i}" for i in range(n))
-        free = LinearSets(names, none, none[:, :, 0], none[:, :, 0], box, box + 1.0)
-        return with_rows(free, rows, bounds, "tolerance")
+def _first_choices(held: list[tuple[int, tuple[int, ...]]], passable: BoolArray | None) -> Choices:
+    """Sets that hold a grasp or some of its contacts; of each the first choice of these."""
+    choices: Choices = {}
+    for index, chosen in held:
+        if passable is None or passable[index]:
+            choices.setdefault(index, chosen)
+    return choices
 
 
 @contextmanager

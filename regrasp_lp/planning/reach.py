@@ -8,7 +8,7 @@ fraction that is a double is within the limits iff it is on a segment.
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Mapping
 from fractions import Fraction
 from itertools import combinations
 
@@ -18,8 +18,9 @@ from numpy.typing import ArrayLike
 from regrasp_lp.contact import FRACTION_SNAP, Contact, Grasp
 from regrasp_lp.errors import HandError
 from regrasp_lp.friction import UNIT_ROUNDOFF, Cones
-from regrasp_lp.grasp_sets.spacing import Spacing
+from regrasp_lp.grasp_sets.spacing import Spacing, assignments
 from regrasp_lp.planning.hand import Hand
+from regrasp_lp.planning.touching import Intervals
 from regrasp_lp.polygon import Polygon
 
 _LEAST = 2 * FRACTION_SNAP
@@ -52,30 +53,34 @@ def hand_cones(polygon: Polygon, friction: ArrayLike, hand: Hand) -> Cones:
         If the hand's `reachable` names an edge that the polygon does not have.
     """
     cones = Cones.of(polygon, friction)
-    if not (hand.edge_clearance or hand.reachable):
+    if not (hand.edge_clearance or hand.reachable or hand.finger_reachable or hand.coupled):
         return cones
-    for edge in hand.intervals:
-        if edge >= polygon.n_edges:
-            raise HandError(
-                f"reachable names edge {edge}; {polygon.name or 'the polygon'} has edges 0 to "
-                f"{polygon.n_edges - 1}"
-            )
-    segments = [
-        (edge, lower, upper)
+    reach = [hand.intervals_of(group[0]) for group in hand.groups]
+    named = max((edge for intervals in reach for edge in intervals), default=-1)
+    if named >= polygon.n_edges:
+        raise HandError(
+            f"reachable names edge {named}; {polygon.name or 'the polygon'} has edges 0 to "
+            f"{polygon.n_edges - 1}"
+        )
+    segments = sorted(
+        (edge, *ends, group)
         for edge in range(polygon.n_edges)
-        for lower, upper in _on_edge(cones, edge, hand)
-    ]
-    number = np.array([edge for edge, _, _ in segments], dtype=np.intp)
-    ends = np.array([ends for _, *ends in segments], dtype=np.float64).reshape(-1, 2)
-    whole = len(segments) == polygon.n_edges and bool((ends == [0.0, 1.0]).all())
-    return cones if whole else cones.touching(number, ends[:, 0], ends[:, 1])
+        for group, intervals in enumerate(reach)
+        for ends in _on_edge(cones, edge, intervals, hand.edge_clearance)
+    )
+    edges, lower, upper, groups = np.array(segments, dtype=np.float64).reshape(-1, 4).T
+    whole = len(segments) == polygon.n_edges and bool((upper - lower == 1).all())
+    if whole:
+        return cones
+    return cones.touching(edges.astype(np.intp), lower, upper, groups.astype(np.intp))
 
 
 def spacing_of(cones: Cones, hand: Hand) -> Spacing | None:
-    """Return a hand's limits to the distance between fingers, if there are any."""
-    if not hand.spaced:
+    """Return a hand's limits that tie fingers to each other, if there are any."""
+    if not hand.coupled:
         return None
-    return Spacing(cones, hand.max_span, hand.fingertip_separation)
+    sizes = tuple(len(group) for group in hand.groups)
+    return Spacing(cones, hand.max_span, hand.fingertip_separation, sizes)
 
 
 def within_reach(polygon: Polygon, hand: Hand, grasp: Grasp, role: str) -> Grasp:
@@ -88,7 +93,7 @@ def within_reach(polygon: Polygon, hand: Hand, grasp: Grasp, role: str) -> Grasp
     grasp : Grasp
         Resolved.
     role : str
-        "start" or "goal", for messages.
+        "start", which is held by certain fingers, or "goal"; for messages, too.
 
     Returns
     -------
@@ -99,18 +104,27 @@ def within_reach(polygon: Polygon, hand: Hand, grasp: Grasp, role: str) -> Grasp
     ------
     HandError
         If a contact is where the hand may not touch, or two of them are too far apart or too near;
-        the message says which, and what the limit is. Both are decided exactly.
+        the message says which, and what the limit is. Both are decided exactly. Also if the hand
+        has no different fingers for all of the contacts.
     """
     cones = hand_cones(polygon, 1.0, hand)
-    segments, fractions = cones.places(grasp.edges, grasp.fractions)
-    for contact, segment in zip(grasp, segments.tolist(), strict=True):
+    fingers = start_fingers(grasp) if role == "start" else None
+    group = None if fingers is None else np.array([hand.group_of(finger) for finger in fingers])
+    segments, fractions = cones.places(grasp.edges, grasp.fractions, group)
+    for n, (contact, segment) in enumerate(zip(grasp, segments.tolist(), strict=True)):
         if segment < 0:
+            finger = None if fingers is None else fingers[n]
             raise HandError(
                 f"the {role} has a contact on edge {contact.edge} at {contact.position:.6g}, where "
-                f"the hand may not touch: {_allowed(cones, hand, contact)}"
+                f"{_allowed(cones, hand, contact, finger)}"
             )
+    if not assignments(cones, [len(g) for g in hand.groups], grasp.edges, fractions, group):
+        raise HandError(
+            f"the {role} has contacts on edges {grasp.edges.tolist()}, for which the hand has no "
+            "different fingers that may all touch there (finger_reachable)"
+        )
     pairs = zip(grasp.edges.tolist(), fractions.tolist(), strict=True)
-    found = polygon.resolve(Grasp.at_fractions(pairs))
+    found = polygon.resolve(Grasp.at_fractions(pairs, fingers))
     for one, other in combinations(found, 2):
         fault = _distance_fault(cones, hand, one, other)
         if fault is not None:
@@ -119,6 +133,11 @@ def within_reach(polygon: Polygon, hand: Hand, grasp: Grasp, role: str) -> Grasp
                 f"{other.edge} at {other.position:.6g}, {fault} of the hand"
             )
     return found
+
+
+def start_fingers(start: Grasp) -> tuple[int, ...]:
+    """Return the finger of each contact of a start."""
+    return start.fingers or tuple(range(1, len(start) + 1))
 
 
 def _distance_fault(cones: Cones, hand: Hand, one: Contact, other: Contact) -> str | None:
@@ -139,7 +158,7 @@ def _point(cones: Cones, contact: Contact) -> list[Fraction]:
     return [(int(a) + f * int(v)) / whole.exact_unit for a, v in zip(start, vector, strict=True)]
 
 
-def room(cones: Cones, hand: Hand, contacts: Iterable[Contact]) -> float:
+def room(cones: Cones, hand: Hand, contacts: Mapping[int, Contact]) -> float:
     """Return how far fingers may be off their places on their edges within the hand's limits.
 
     Parameters
@@ -147,8 +166,8 @@ def room(cones: Cones, hand: Hand, contacts: Iterable[Contact]) -> float:
     cones : Cones
         `hand_cones` of the object.
     hand : Hand
-    contacts : iterable of Contact
-        Where they are (resolved).
+    contacts : mapping of int to Contact
+        Where which fingers are (resolved).
 
     Returns
     -------
@@ -156,16 +175,15 @@ def room(cones: Cones, hand: Hand, contacts: Iterable[Contact]) -> float:
         In the object's unit; of a distance between two fingers half of what is left. Negative
         beyond a limit, inf without limits.
     """
-    touching = list(contacts)
     least = math.inf
     if cones.whole is not cones:
-        for contact in touching:
+        for finger, contact in contacts.items():
             assert contact.fraction is not None  # resolved
-            here = cones.edge == contact.edge
+            here = (cones.edge == contact.edge) & (cones.group == hand.group_of(finger))
             within = np.minimum(contact.fraction - cones.lower, cones.upper - contact.fraction)
             inside = float(within[here].max(initial=-math.inf))
             least = min(least, inside * float(cones.whole.lengths[contact.edge]))
-    for one, other in combinations(touching, 2):
+    for one, other in combinations(contacts.values(), 2):
         points = zip(_point(cones, one), _point(cones, other), strict=True)
         distance = math.sqrt(sum((p - q) ** 2 for p, q in points))
         if hand.max_span is not None:
@@ -175,21 +193,28 @@ def room(cones: Cones, hand: Hand, contacts: Iterable[Contact]) -> float:
     return least
 
 
-def _allowed(cones: Cones, hand: Hand, contact: Contact) -> str:
-    """Where on the edge of a contact a hand may touch, and why not elsewhere."""
+def _allowed(cones: Cones, hand: Hand, contact: Contact, finger: int | None) -> str:
+    """Where on the edge of a contact a hand (a finger of it) may touch, and why not elsewhere."""
+    here = cones.edge == contact.edge
+    who, intervals = "the hand", hand.intervals
+    if finger is not None and len(hand.groups) > 1:
+        who, intervals = f"finger {finger}", hand.intervals_of(finger)
+        here &= cones.group == hand.group_of(finger)
     limits = [f"edge_clearance={hand.edge_clearance:g}"] if hand.edge_clearance else []
     limits += ["reachable"] if contact.edge in hand.intervals else []
-    here = np.flatnonzero(cones.edge == contact.edge)
+    limits += ["finger_reachable"] if intervals.keys() - hand.intervals.keys() else []
     length = cones.whole.lengths[contact.edge]
     parts = [
         f"from {low * length:.6g} to {high * length:.6g}"
         for low, high in zip(cones.lower[here], cones.upper[here], strict=True)
     ]
     where = " and ".join(parts) if parts else "nowhere"
-    return f"{where} on this edge ({' and '.join(limits)} of the hand)"
+    return f"{who} may not touch: {where} on this edge ({' and '.join(limits)} of the hand)"
 
 
-def _on_edge(cones: Cones, edge: int, hand: Hand) -> list[tuple[float, float]]:
+def _on_edge(
+    cones: Cones, edge: int, intervals: Mapping[int, Intervals], clearance: float
+) -> list[tuple[float, float]]:
     """First and last fractions, as doubles, of the segments of one edge."""
     vector = [Fraction(int(v), cones.exact_unit) for v in cones.exact_vectors[edge]]
     square = vector[0] ** 2 + vector[1] ** 2
@@ -205,12 +230,12 @@ def _on_edge(cones: Cones, edge: int, hand: Hand) -> list[tuple[float, float]]:
         most = Fraction(position) ** 2
         return _before(_least_double(position / length, lambda f: f**2 * square > most))
 
-    clear = Fraction(hand.edge_clearance) ** 2
-    near_end = 1 - hand.edge_clearance / length
+    clear = Fraction(clearance) ** 2
+    near_end = 1 - clearance / length
     kept = _before(_least_double(near_end, lambda f: (1 - f) ** 2 * square < clear))
     segments = []
-    for low, high in hand.intervals.get(edge, ((0.0, math.inf),)):
-        lower = first(max(low, hand.edge_clearance))
+    for low, high in intervals.get(edge, ((0.0, math.inf),)):
+        lower = first(max(low, clearance))
         upper = kept if high > 2 * length else min(kept, last(high))
         lower = lower if lower == 0 else max(lower, _LEAST)
         upper = upper if upper == 1 else min(upper, 1 - _LEAST)

@@ -172,7 +172,7 @@ def _grasp(polygon: Polygon, functions: TorqueFunctions, fractions: FloatArray) 
     return polygon.resolve(Grasp.at_fractions(pairs))
 
 
-def touchable_part(plan: Plan, contact: Contact) -> tuple[float, float]:
+def touchable_part(plan: Plan, finger: int, contact: Contact) -> tuple[float, float]:
     """Return from which to which fraction of its edge a finger may be, without leaving it.
 
     0 and 1 unless the hand has limits. A contact beyond them has no room.
@@ -180,6 +180,8 @@ def touchable_part(plan: Plan, contact: Contact) -> tuple[float, float]:
     assert contact.fraction is not None  # contacts of plans are resolved
     cones, f = plan.touchable, contact.fraction
     here = (cones.edge == contact.edge) & (cones.lower <= f) & (f <= cones.upper)
+    if cones.whole is not cones:
+        here &= cones.group == plan.hand.group_of(finger)
     part = np.flatnonzero(here)
     return (float(cones.lower[part[0]]), float(cones.upper[part[0]])) if part.size else (f, f)
 
@@ -193,7 +195,7 @@ def _rooms(plan: Plan, contacts: Mapping[int, Contact], fingers: tuple[int, ...]
     rooms, positions = {}, {}
     for finger, contact in contacts.items():
         (f,), length = Grasp([contact]).fractions, plan.polygon.edge_lengths[contact.edge]
-        low, high = touchable_part(plan, contact)
+        low, high = touchable_part(plan, finger, contact)
         rooms[finger] = np.array([f - low, high - f]) * length
         positions[finger] = f * length
     separation, span = plan.hand.fingertip_separation, plan.hand.max_span

@@ -58,18 +58,35 @@ def checked_grasp(
         raise ContactError(f"the {role} must have 2 or 3 contacts, got {len(resolved)}")
     if len(resolved) > hand.fingers:
         raise HandError(f"the {role} needs {len(resolved)} fingers, the hand has {hand.fingers}")
+    _check_fingers(resolved, hand, role)
     for one, other in combinations(resolved, 2):
         if _same_point(polygon, one, other):
             raise ContactError(
                 f"the {role} has two contacts at one point: {_text(one)} and {_text(other)}; "
                 "move one of them"
             )
-    if not is_force_closure(polygon, resolved, friction):
-        raise NotForceClosureError(_not_closed(polygon, resolved, friction, role))
     # Equal fractions are equal contacts, however their positions were rounded.
     pairs = zip(resolved.edges.tolist(), resolved.fractions.tolist(), strict=True)
-    same = polygon.resolve(Grasp.at_fractions(pairs))
-    return within_reach(polygon, hand, same, role) if hand.limited else same
+    same = polygon.resolve(Grasp.at_fractions(pairs, resolved.fingers))
+    if hand.limited:
+        resolved = same = within_reach(polygon, hand, same, role)
+    if not is_force_closure(polygon, same, friction):
+        raise NotForceClosureError(_not_closed(polygon, resolved, friction, hand, role))
+    return same
+
+
+def _check_fingers(grasp: Grasp, hand: Hand, role: str) -> None:
+    if grasp.fingers is None:
+        return
+    if role == "goal":
+        raise ContactError(
+            "the goal is a set of contacts, whichever fingers are there: leave its fingers out"
+        )
+    if max(grasp.fingers) > hand.fingers:
+        raise HandError(
+            f"the {role} is held by fingers {list(grasp.fingers)}, the hand has fingers 1 to "
+            f"{hand.fingers}"
+        )
 
 
 def _same_point(polygon: Polygon, one: Contact, other: Contact) -> bool:
@@ -83,7 +100,7 @@ def _text(contact: Contact) -> str:
     return f"edge {contact.edge} at {contact.position:.6g}"
 
 
-def _not_closed(polygon: Polygon, grasp: Grasp, friction: FloatArray, role: str) -> str:
+def _not_closed(polygon: Polygon, grasp: Grasp, friction: FloatArray, hand: Hand, role: str) -> str:
     contacts = ", ".join(_text(contact) for contact in grasp)
-    found = remedy(polygon, grasp, friction)
+    found = remedy(polygon, grasp, friction, hand)
     return f"the {role} ({contacts}) is not in force closure: {found}"

@@ -87,14 +87,15 @@ def shortest_route(
     Raises
     ------
     HandError
-        If the hand has limits to the distance of two fingers, which slides here do not know.
+        If the hand has limits to the distance of two fingers or of single fingers, which slides
+        here do not know.
     SolverError
         If the budget was used up before any route was found.
     """
-    if hand.spaced:
+    if hand.coupled:
         raise HandError(
-            "routes of least cost are not searched with max_span or fingertip_separation: leave "
-            "them out, or choose another objective"
+            "routes of least cost are not searched with max_span, fingertip_separation or limits "
+            "of single fingers: leave them out, or choose another objective"
         )
     task = _Task.of(sets, switches, hand, starts, goals, objective, floor, allowed)
     clock = _Clock(budget or Budget())

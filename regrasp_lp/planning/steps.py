@@ -18,6 +18,11 @@ class Place:
     finger : int
         1 to k.
     contact : Contact
+
+    Examples
+    --------
+    >>> Place(finger=4, contact=Contact(edge=5, position=0.2)).contact.edge
+    5
     """
 
     finger: int
@@ -45,6 +50,11 @@ class Slide:
     ----------
     moves : mapping of int to Contact
         Where each moving finger arrives, on the edge that it is on.
+
+    Examples
+    --------
+    >>> sorted(Slide({2: Contact(0, 1.0), 1: Contact(3, 0.5)}).moves)
+    [1, 2]
     """
 
     moves: Mapping[int, Contact]

@@ -162,6 +162,9 @@ class _Replay:
         self._check_rest("start")
         for number, step in enumerate(plan.steps, 1):
             where = f"step {number} ({_title(step)})"
+            fault = self.limits.done_by(step)
+            if fault is not None:
+                raise _Fault(f"{where}: {fault}")
             if isinstance(step, PlaceStep):
                 self._place(where, step)
             elif isinstance(step, ReleaseStep):
@@ -175,7 +178,7 @@ class _Replay:
         self._check_finger(where, step.finger)
         if step.finger in self.held:
             raise _Fault(f"{where}: {self._named(step.finger)} touches already")
-        self._check_place(where, f"finger {step.finger}", step.at)
+        self._check_place(where, step.finger, step.at)
         point = self._point(step.at)
         for other, place in self.held.items():
             if self._point(place) == point:
@@ -211,8 +214,8 @@ class _Replay:
                     f"{where}: {self._named(move.finger)} is to slide from fraction "
                     f"{move.start[1]!r}, where it is not"
                 )
-            self._check_place(where, f"finger {move.finger}", move.end)
-            fault = self.limits.along(move.start, move.end)
+            self._check_place(where, move.finger, move.end)
+            fault = self.limits.along(move.start, move.end, move.finger)
             if fault is not None:
                 raise _Fault(f"{where}: {self._named(move.finger)} {fault}")
             after[move.finger] = move.end
@@ -291,7 +294,7 @@ class _Replay:
 
     def _check_goal(self) -> None:
         for place in self.plan.goal:
-            self._check_place("goal", "a contact", place)
+            self._check_place("goal", None, place)
         goal, reached = Counter(self.plan.goal), Counter(self.held.values())
         if goal == reached:
             return
@@ -308,8 +311,9 @@ class _Replay:
                 f"{self.plan.fingers}"
             )
 
-    def _check_place(self, where: str, who: str, place: Place) -> None:
+    def _check_place(self, where: str, finger: int | None, place: Place) -> None:
         edge, fraction = place
+        who = "a contact" if finger is None else f"finger {finger}"
         if not 0 <= edge < self.polygon.n_edges:
             raise _Fault(
                 f"{where}: {who} on edge {edge}, but the polygon has edges 0 to "
@@ -317,7 +321,7 @@ class _Replay:
             )
         if not 0 <= fraction <= 1:
             raise _Fault(f"{where}: {who} off edge {edge}: fraction {fraction!r} is not in [0, 1]")
-        fault = self.limits.at(place)
+        fault = self.limits.at(place, finger)
         if fault is not None:
             raise _Fault(f"{where}: {who} at fraction {fraction!r} {fault}")
 

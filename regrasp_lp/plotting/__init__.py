@@ -13,6 +13,7 @@ try:
 except ModuleNotFoundError as error:
     raise MissingExtraError("matplotlib", "plot", "drawing") from error
 
+from regrasp_lp.plotting.animation import plan_gif
 from regrasp_lp.plotting.contact_space import (
     ContactSpaceArtists,
     ProjectionArtists,
@@ -36,6 +37,8 @@ from regrasp_lp.plotting.parallel_sets import (
     plot_common_cone,
     plot_union_volume,
 )
+from regrasp_lp.plotting.quality import QualityMapArtists, plot_quality_map
+from regrasp_lp.plotting.sets import plot_grasp_set
 
 __all__ = [
     "CandidateArtists",
@@ -49,9 +52,11 @@ __all__ = [
     "GraspArtists",
     "PolygonArtists",
     "ProjectionArtists",
+    "QualityMapArtists",
     "SubpolytopeArtists",
     "UnionVolumeArtists",
     "Window",
+    "plan_gif",
     "plot_candidates",
     "plot_common_cone",
     "plot_cones_at_one_point",
@@ -60,9 +65,11 @@ __all__ = [
     "plot_focus_switch",
     "plot_graph",
     "plot_grasp",
+    "plot_grasp_set",
     "plot_plan",
     "plot_polygon",
     "plot_projections",
+    "plot_quality_map",
     "plot_subpolytopes",
     "plot_union_volume",
 ]

@@ -103,7 +103,7 @@ def plot_plan(plan: Plan, *, columns: int | None = None, dpi: float = 110.0) -> 
     for i in range(len(held)):
         ax = figure.add_axes(grid.panel(i), label=f"panel {i}")
         ax.set_axis_off()
-        _draw_panel(plan, i, ax, found[i] if found else None)
+        draw_panel(plan, i, ax, found[i] if found else None)
         _write_title(figure, ax, plan, i)
     columns_of_key = math.ceil(len(key) / grid.key_lines)
     figure.legend(
@@ -142,7 +142,7 @@ def _layout(polygon: Polygon, panels: int, entries: int, columns: int | None) ->
     return _Grid(math.ceil(panels / columns), columns, width, height, key_lines)
 
 
-def _draw_panel(plan: Plan, index: int, ax: Axes, region: Region | None) -> GraspArtists:
+def draw_panel(plan: Plan, index: int, ax: Axes, region: Region | None) -> GraspArtists:
     """Draw what is held after `index` steps, and what the last of them changed."""
     grasp = plan.grasps[index]
     moved = _moved(plan, index)
@@ -189,7 +189,8 @@ def _letter(index: int) -> str:
     return f"({letters})"
 
 
-def _words(plan: Plan, index: int) -> str:
+def step_in_words(plan: Plan, index: int) -> str:
+    """Return what step number `index`, counted from 1, does; 0 is the start."""
     last = index == len(plan.steps)
     if index == 0:
         return "start and goal" if last else "start"
@@ -204,7 +205,8 @@ def _words(plan: Plan, index: int) -> str:
     return words + ": goal" if last else words
 
 
-def _support_in_words(plan: Plan, index: int) -> str:
+def support_in_words(plan: Plan, index: int) -> str:
+    """Return which fingers hold the object after `index` steps, and how well."""
     grasp = plan.grasps[index]
     fingers = ", ".join(map(str, sorted(grasp.support.fingers)))
     text = f"held by {fingers}: margin {grasp.margin:.3g}"
@@ -229,7 +231,7 @@ def _write_head(figure: Figure, plan: Plan) -> None:
         name = name[:-1]
         head.set_text(name + "…")
     words = figure.text(left, top - 0.2 / height, amount, fontsize=8.5, **style)
-    _shrink(figure, [words], room)
+    fit_text(figure, [words], room)
 
 
 def _write_title(figure: Figure, ax: Axes, plan: Plan, index: int) -> None:
@@ -242,16 +244,16 @@ def _write_title(figure: Figure, ax: Axes, plan: Plan, index: int) -> None:
     )
     indent = (0.08 + 0.08 * len(letter.get_text())) / width
     step = figure.text(
-        box.x0 + indent, box.y1 + 0.19 / height, _words(plan, index), fontsize=9, **style
+        box.x0 + indent, box.y1 + 0.19 / height, step_in_words(plan, index), fontsize=9, **style
     )
     held = figure.text(
         box.x0 + indent,
         box.y1 + 0.04 / height,
-        _support_in_words(plan, index),
+        support_in_words(plan, index),
         fontsize=7.5,
         **style,
     )
-    _shrink(figure, [step, held], (box.x1 - box.x0 - indent) * width)
+    fit_text(figure, [step, held], (box.x1 - box.x0 - indent) * width)
 
 
 def _width(figure: Figure, text: Text) -> float:
@@ -260,7 +262,7 @@ def _width(figure: Figure, text: Text) -> float:
     return float(text.get_window_extent(renderer).width / figure.dpi)
 
 
-def _shrink(figure: Figure, texts: list[Text], width: float) -> None:
+def fit_text(figure: Figure, texts: list[Text], width: float) -> None:
     """Make texts smaller until each is at most `width` inches wide."""
     for text in texts:
         while (wide := _width(figure, text)) > width:  # again, as glyphs are fitted to pixels

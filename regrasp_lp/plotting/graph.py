@@ -12,11 +12,10 @@ from matplotlib.axes import Axes
 from matplotlib.collections import LineCollection, PathCollection
 from matplotlib.lines import Line2D
 from matplotlib.text import Text
-from scipy import sparse
-from scipy.sparse.linalg import eigsh
 
 from regrasp_lp.errors import OptionError
-from regrasp_lp.friction import BoolArray, FloatArray, IntArray
+from regrasp_lp.friction import FloatArray, IntArray
+from regrasp_lp.graph_layout import BETWEEN, NAMED_FROM, lay_out
 from regrasp_lp.plotting import palette
 from regrasp_lp.plotting.frame import Drawing, Frame, OwnFigure
 
@@ -26,11 +25,6 @@ if TYPE_CHECKING:
 _MOST_IMPLICIT = 300  # pairs of sets that need to hold nothing are drawn up to this number
 _MOST_SWITCHES = 60_000  # drawn at most
 _RASTER = 5_000  # with more switches than this they are pixels, also in vector files
-_FORCED = 4_000  # larger components are laid out by eigenvectors alone
-_ROUND = 6  # components up to this size start from a circle
-_EFFORT = 120_000  # sets times steps of the layout by forces
-_BETWEEN = 0.035  # room over a row of squares for their sizes, in widths of all
-_NAMED_FROM = 0.08  # squares from this part of the width on have their size written over them
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -94,13 +88,9 @@ def plot_graph(
     """
     if color not in ("kind", "component"):
         raise OptionError(f'color must be "kind" or "component", got {color!r}')
-    components = [np.array(sorted(c), dtype=np.intp) for c in graph.components()]
-    listed, implicit = _listed(graph), _implicit(graph)
-    squares = _squares([len(c) for c in components])
-    positions = np.zeros((len(graph), 2))
-    for members, square in zip(components, squares, strict=True):
-        unit = _in_unit_square(members, listed, _joined_to_all(graph))
-        positions[members] = square[:2] + square[2] * (0.07 + 0.86 * unit)
+    layout, implicit = lay_out(graph), _implicit(graph)
+    components, squares, positions = layout.components, layout.squares, layout.positions
+    listed = layout.listed
     shown = np.concatenate((listed[:: -(-len(listed) // _MOST_SWITCHES) or 1], implicit))
     ax = _axes(ax, len(graph), squares)
     lines = _draw_switches(ax, positions[shown])
@@ -118,17 +108,6 @@ def plot_graph(
 # --- switches -----------------------------------------------------------------------------------
 
 
-def _listed(graph: SwitchingGraph) -> IntArray:
-    """The pairs of sets that have to hold contacts in common and can, shape (K, 2)."""
-    adjacent, contacts = graph.hand.adjacent, graph.sets.contacts
-    chunks = [np.zeros((0, 2), dtype=np.intp)]
-    for pairs in graph.switches.pairs():
-        i, j = pairs.first, pairs.second
-        holds = ~adjacent[contacts[i], contacts[j]]
-        chunks.append(np.unique(np.stack((i[holds], j[holds]), axis=1), axis=0))
-    return np.asarray(np.unique(np.concatenate(chunks), axis=0))
-
-
 def _implicit(graph: SwitchingGraph) -> IntArray:
     """The pairs that need to hold nothing, shape (K, 2); none if they are too many to draw."""
     adjacent, contacts = graph.hand.adjacent, graph.sets.contacts
@@ -141,90 +120,6 @@ def _implicit(graph: SwitchingGraph) -> IntArray:
         return np.zeros((0, 2), dtype=np.intp)
     pairs = [(i, j) for n, m in free for i in of[n] for j in of[m] if n < m or i < j]
     return np.array(pairs, dtype=np.intp).reshape(-1, 2)
-
-
-def _joined_to_all(graph: SwitchingGraph) -> BoolArray:
-    """Which sets are adjacent to all of some number of contacts, shape (N,)."""
-    adjacent, contacts = graph.hand.adjacent, graph.sets.contacts
-    return np.asarray(adjacent[contacts][:, np.unique(contacts)].any(axis=1))
-
-
-# --- layout -------------------------------------------------------------------------------------
-
-
-def _squares(sizes: Sequence[int]) -> FloatArray:
-    """Squares of components, largest first, in rows: left, bottom and side of each."""
-    sides = np.sqrt(np.array(sizes, dtype=np.float64))
-    width = max(sides.max(initial=0.0), np.sqrt(1.25 * np.sum(sizes)))
-    squares, x, y = np.zeros((len(sizes), 3)), 0.0, 0.0
-    for k, side in enumerate(sides):
-        if x > 0 and x + side > 1.001 * width:
-            x, y = 0.0, y - (_BETWEEN * width if side >= _NAMED_FROM * width else 0.0)
-        if x == 0:
-            y -= side  # of a row the first square is the largest
-        squares[k] = x, y, side
-        x += side
-    return squares
-
-
-def _in_unit_square(members: IntArray, listed: IntArray, hubs: BoolArray) -> FloatArray:
-    """Positions of one component from 0 to 1; sets adjacent to all others are joined to a hub."""
-    n = len(members)
-    if n == 1:
-        return np.full((1, 2), 0.5)
-    local = np.full(len(hubs), -1)
-    local[members] = np.arange(n)
-    pairs = local[listed]
-    pairs = pairs[pairs[:, 0] >= 0]
-    joined = np.flatnonzero(hubs[members])
-    pairs = np.concatenate((pairs, np.stack((joined, np.full(len(joined), n)), axis=1)))
-    n_points = n + bool(len(joined))
-    ones = np.ones(len(pairs))
-    half = sparse.csr_array((ones, (pairs[:, 0], pairs[:, 1])), shape=(n_points, n_points))
-    adjacency = sparse.csr_array(half + half.T)
-    x = _by_eigenvectors(adjacency)
-    if n_points <= _FORCED:
-        x = _by_forces(adjacency, x)
-    x = x[:n] - np.median(x[:n], axis=0)
-    far = np.maximum(np.hypot(*x.T), 1e-12)[:, None]
-    x = x / far * np.log1p(far / np.median(far))  # what is far out is drawn in
-    extent = np.ptp(x, axis=0)
-    return np.asarray(0.5 + (x - x.min(axis=0) - extent / 2) / np.maximum(extent, extent.max() / 2))
-
-
-def _by_eigenvectors(adjacency: sparse.csr_array) -> FloatArray:
-    """Positions about 0 of size 1 by the second and third eigenvector of the random walk."""
-    n = adjacency.shape[0]
-    random = np.random.default_rng(0)
-    if n <= _ROUND:
-        turn = 2 * np.pi * np.arange(n) / n
-        return np.stack((np.cos(turn), np.sin(turn)), axis=1)
-    root = np.sqrt(adjacency.sum(axis=1))
-    walk = sparse.csr_array(adjacency / root[:, None] / root[None, :])
-    _, vectors = eigsh(walk, k=3, which="LA", v0=random.normal(size=n), tol=1e-2)
-    x = vectors[:, [1, 0]] / root[:, None]
-    ranks = x.argsort(axis=0, kind="stable").argsort(axis=0) / n - 0.5
-    return np.asarray(x / np.abs(x).max(axis=0) + ranks + 0.01 * random.normal(size=x.shape))
-
-
-def _by_forces(adjacency: sparse.csr_array, start: FloatArray) -> FloatArray:
-    """Fruchterman and Reingold's layout: neighbours attract, all repel, steps get shorter."""
-    n, x = len(start), np.ascontiguousarray(start.T, dtype=np.float32)
-    i, j = sparse.coo_array(adjacency).coords
-    spacing = np.float32(1 / np.sqrt(n))
-    steps = int(np.clip(_EFFORT / n, 50, 200))
-    for length in np.linspace(0.1, 0.0, steps, endpoint=False, dtype=np.float32):
-        push, across = (np.subtract.outer(along, along) for along in x)
-        push *= push
-        push += np.square(across, out=across)
-        np.divide(spacing**2, np.maximum(push, 1e-4 * spacing**2, out=push), out=push)
-        # einsum and no matrix product, whose threads are slow on a busy machine
-        force = push.sum(axis=1) * x - np.stack([np.einsum("ij,j->i", push, v) for v in x])
-        pull = x[:, i] - x[:, j]
-        pull *= np.hypot(*pull) / spacing
-        force -= np.stack([np.bincount(i, along, minlength=n) for along in pull])
-        x += force * (length / np.maximum(np.hypot(*force), 1e-12))
-    return np.asarray(x.T, dtype=np.float64)
 
 
 # --- drawing ------------------------------------------------------------------------------------
@@ -240,7 +135,7 @@ def _axes(ax: Axes | None, n: int, squares: FloatArray) -> Axes:
         across, down, head = max(across, 4.2), max(down, 1.0), 0.95
         figure = OwnFigure((across, down + head), dpi=110)
         ax = figure.add_axes((0.02, 0.01, 0.96, down / (down + head)))
-    over = _BETWEEN * width if len(squares) > 1 else 0.0
+    over = BETWEEN * width if len(squares) > 1 else 0.0
     ax.set(xlim=(0, width), ylim=(-height, over), aspect="equal", anchor="NW")
     ax.set_axis_off()
     return ax
@@ -303,7 +198,7 @@ def _write_sizes(ax: Axes, components: Sequence[IntArray], squares: FloatArray) 
     """Write the number of sets over each square that is wide enough, if there are several."""
     if len(components) < 2:
         return ()
-    least = _NAMED_FROM * float(np.ptp(ax.get_xlim()))
+    least = NAMED_FROM * float(np.ptp(ax.get_xlim()))
     return tuple(
         ax.text(
             x, y + side, _counted(len(members), "set"), fontsize=7, color=palette.INK, va="bottom"

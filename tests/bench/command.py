@@ -8,7 +8,18 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 
-from bench import clocks, gcs, growth, one_by_one, planning, queries, ratio, subjects, where
+from bench import (
+    clocks,
+    gcs,
+    growth,
+    imports,
+    one_by_one,
+    planning,
+    queries,
+    ratio,
+    subjects,
+    where,
+)
 from bench.growth import Growth
 from bench.ratio import Meeting
 from bench.report import Table, machine
@@ -77,6 +88,10 @@ def run_checks(options: argparse.Namespace, results: Results) -> None:
         results.add(table)
 
 
+def run_imports(options: argparse.Namespace, results: Results) -> None:
+    results.add(imports.measure(options.repeats))
+
+
 def run_planning(options: argparse.Namespace, results: Results) -> None:
     pairs = 1 if options.quick else options.pairs
     large = planning.measure_large(subjects.large_outlines(options.quick), pairs)
@@ -107,6 +122,7 @@ PARTS: dict[str, Callable[[argparse.Namespace, Results], None]] = {
     "where": run_where,
     "growth": run_growth,
     "checks": run_checks,
+    "imports": run_imports,
     "planning": run_planning,
     "queries": run_queries,
     "gcs": run_gcs,
@@ -117,7 +133,7 @@ def parser() -> argparse.ArgumentParser:
     result = argparse.ArgumentParser(
         prog="python tests/bench",
         description="Measure the package: against the chapter's method on GEOS, where its time "
-        "goes, growth, one LP at a time, planning without the graph, queries, and gcsopt.",
+        "goes, growth, one LP at a time, importing, planning without the graph, queries, gcsopt.",
         epilog="Needs the extras of the tests (pip install -e '.[test]'). Takes about a quarter "
         "of an hour; leave the machine alone meanwhile. Outlines of a corpus are planned on if "
         "REGRASP_LP_CORPUS names its folder.",

@@ -1,23 +1,14 @@
-"""How good a grasp is: margin and tolerance, for one grasp or for many."""
+"""Measures by the torque functions: margin and tolerance."""
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable
-from typing import overload
+from typing import Unpack, overload
 
-import numpy as np
 from numpy.typing import ArrayLike
 
-from regrasp_lp.contact import Contact, Grasp
-from regrasp_lp.errors import ContactError, FrictionError
-from regrasp_lp.force_closure import resolve_batch
-from regrasp_lp.friction import Cones, FloatArray
+from regrasp_lp.friction import FloatArray
 from regrasp_lp.polygon import Polygon
-from regrasp_lp.torque import TorqueFunctions, torque_functions
-
-_CHUNK = 20_000
-
-GraspLike = Grasp | Iterable[Contact | tuple[int, float]]
+from regrasp_lp.quality.grasps import GraspLike, Places, measure
 
 
 @overload
@@ -31,8 +22,7 @@ def margin(
     friction: ArrayLike | None = None,
     *,
     edges: ArrayLike,
-    positions: ArrayLike | None = None,
-    fractions: ArrayLike | None = None,
+    **places: Unpack[Places],
 ) -> FloatArray: ...
 
 
@@ -73,7 +63,15 @@ def margin(
     >>> round(margin(square, [(0, 0.5), (2, 0.5)], friction=0.5), 6)
     0.223607
     """
-    return _measure(TorqueFunctions.margins, polygon, grasp, friction, edges, positions, fractions)
+    return measure(
+        lambda grasps: grasps.functions.margins(grasps.fractions),
+        polygon,
+        grasp,
+        friction,
+        edges,
+        positions,
+        fractions,
+    )
 
 
 @overload
@@ -87,8 +85,7 @@ def tolerance(
     friction: ArrayLike | None = None,
     *,
     edges: ArrayLike,
-    positions: ArrayLike | None = None,
-    fractions: ArrayLike | None = None,
+    **places: Unpack[Places],
 ) -> FloatArray: ...
 
 
@@ -104,7 +101,8 @@ def tolerance(
     """Return the tolerance of a grasp, or of many.
 
     The largest δ such that every contact may be anywhere within ±δ of its place on its edge,
-    independently: ``min(max_k M_k/w_k, max_j -M_j/w_j, u_i, l_i - u_i)``.
+    independently: ``min(max_k M_k/w_k, max_j -M_j/w_j, u_i, l_i - u_i)``. Half the width of the
+    largest equal independent contact regions around the contacts.
 
     Parameters
     ----------
@@ -119,7 +117,9 @@ def tolerance(
     Returns
     -------
     float or numpy.ndarray, shape (N,)
-        In the polygon's unit, signed; -inf where the boundary rays do not span the plane.
+        In the polygon's unit, signed; -inf where the boundary rays do not span the plane. It is 0
+        where a contact is at an end of its edge, and positive iff the grasp is in force closure
+        where none is.
 
     Examples
     --------
@@ -127,32 +127,12 @@ def tolerance(
     >>> round(tolerance(square, [(0, 0.5), (2, 0.5)], friction=0.5), 6)
     0.25
     """
-    return _measure(
-        TorqueFunctions.tolerances, polygon, grasp, friction, edges, positions, fractions
+    return measure(
+        lambda grasps: grasps.functions.tolerances(grasps.fractions),
+        polygon,
+        grasp,
+        friction,
+        edges,
+        positions,
+        fractions,
     )
-
-
-def _measure(
-    of: Callable[[TorqueFunctions, FloatArray], FloatArray],
-    polygon: Polygon,
-    grasp: GraspLike | None,
-    friction: ArrayLike | None,
-    edges: ArrayLike | None,
-    positions: ArrayLike | None,
-    fractions: ArrayLike | None,
-) -> float | FloatArray:
-    if friction is None:
-        raise FrictionError("friction is missing: pass one positive number or one per edge")
-    cones = Cones.of(polygon, friction)
-    if grasp is not None:
-        if edges is not None or positions is not None or fractions is not None:
-            raise ContactError("pass either a grasp or arrays (edges=..., positions=...), not both")
-        resolved = polygon.resolve(grasp)
-        functions = torque_functions(cones, resolved.edges[None, :])
-        return float(of(functions, resolved.fractions[None, :])[0])
-    edge_array, fraction_array = resolve_batch(polygon, edges, positions, fractions)
-    parts = [
-        of(torque_functions(cones, edge_array[i : i + _CHUNK]), fraction_array[i : i + _CHUNK])
-        for i in range(0, len(edge_array), _CHUNK)
-    ]
-    return np.concatenate(parts) if parts else np.zeros(0)
