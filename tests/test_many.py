@@ -647,6 +647,8 @@ LONG = [str(REPOSITORY / "models"), "--sets", "complete", "--friction", "0.7"]
 @contextmanager
 def started(*arguments: str) -> Iterator[subprocess.Popen[str]]:
     """A table in a session of its own, of which nothing is left behind if a test fails."""
+    # a shell has what it starts in the background ignore interrupts, and so what these start
+    before = signal.signal(signal.SIGINT, signal.default_int_handler)
     process = subprocess.Popen(
         [sys.executable, "-m", "regrasp_lp", "table", *arguments, "--jobs", "2"],
         stdout=subprocess.PIPE,
@@ -655,6 +657,7 @@ def started(*arguments: str) -> Iterator[subprocess.Popen[str]]:
         env={**os.environ, "PYTHONPATH": str(REPOSITORY)},
         start_new_session=True,
     )
+    signal.signal(signal.SIGINT, before)
     try:
         yield process
     finally:

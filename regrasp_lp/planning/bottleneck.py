@@ -350,6 +350,8 @@ def gates(
     """
     for support in supports:
         after = support.others if arriving else 0
+        if support.limit < cut.least:
+            continue
         inside = support.inside(cut.least)
         if inside:
             yield _Gate(support, support.index, np.array(inside), after)

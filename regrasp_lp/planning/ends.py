@@ -2,7 +2,8 @@
 
 A given grasp cannot be better than it is. So a slide away from it counts only where it falls below
 the grasp it comes from: its other end is *visible* from there, that is, the straight slide stays
-at the margin of the given grasp.
+at the margin of the given grasp. To rest on a part of it, its other contacts released or not yet
+placed, is a choice: such a grasp counts like any other.
 """
 
 from __future__ import annotations
@@ -44,6 +45,8 @@ class Support:
     others : int
         How many contacts of the given grasp are not.
     fractions : numpy.ndarray, shape (m,)
+    chosen : bool
+        Whether these contacts, without the others, are a grasp that counts.
     """
 
     rows: PieceRows
@@ -51,6 +54,7 @@ class Support:
     contacts: tuple[int, ...]
     others: int
     fractions: FloatArray
+    chosen: bool = False
     _found: list[Landing] = field(default_factory=list)
 
     @cached_property
@@ -71,6 +75,16 @@ class Support:
             to_ends = np.minimum(self.fractions, 1 - self.fractions) * lengths
             level = min(level, float(to_ends.min()))
         return float(level)
+
+    @property
+    def limit(self) -> float:
+        """A level that no way over these contacts exceeds, whatever it leads to."""
+        return self.level if self.chosen else np.inf
+
+    def level_in(self, piece: tuple[int, int]) -> float:
+        """Return what a piece leaves of the level of the given contacts."""
+        j, k = piece
+        return min(self.level, float(-self.values[j]), float(self.values[k]))
 
     def inside(self, least: float) -> list[tuple[int, int]]:
         """Return the pieces in which the given grasp itself reaches a level."""
@@ -191,6 +205,8 @@ class Support:
 
     def cap(self, moves: Moves) -> float:
         """Return a level that no way from here exceeds; if all sets are plain, the largest."""
+        if self.chosen:
+            return self.level
         best = self.widest
         for contacts in moves.of(self.index):
             bounds = self.rows.best[contacts.others]
@@ -234,7 +250,7 @@ class Landing:
 
 
 def supports(rows: PieceRows, sets: GraspSets, grasp: Grasp) -> list[Support]:
-    """Return the sets that hold a given grasp or some of its contacts.
+    """Return the sets that hold a given grasp or some of its contacts; some are a choice.
 
     Parameters
     ----------
@@ -248,11 +264,12 @@ def supports(rows: PieceRows, sets: GraspSets, grasp: Grasp) -> list[Support]:
         Support(
             rows,
             index,
-            chosen,
-            len(grasp) - len(chosen),
-            sets.fractions(index, grasp.fractions[list(chosen)]),
+            some,
+            len(grasp) - len(some),
+            sets.fractions(index, grasp.fractions[list(some)]),
+            chosen=len(some) < len(grasp),
         )
-        for index, chosen in sets.holding(grasp)
+        for index, some in sets.holding(grasp)
     ]
 
 

@@ -6,6 +6,7 @@ import json
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
+from itertools import pairwise
 from pathlib import Path
 from types import MappingProxyType
 from typing import TYPE_CHECKING, Any
@@ -218,12 +219,21 @@ class Plan:
 
     @cached_property
     def _given(self) -> tuple[bool, ...]:
-        """Of each held grasp, whether it is (a part of) the start or the goal."""
+        """Of each held grasp, whether it is the start or the goal.
+
+        A part of these is, too, while all of their contacts touch and no finger slides to or away.
+        """
         ends = (set(self.start.values()), set(self.goal))
-        return tuple(any(set(g.grasp) <= end for end in ends) for g in self.grasps)
+        slides = [False, *(isinstance(step, Slide) for step in self.steps), False]
+        given = []
+        for held, moved in zip(self.grasps, map(any, pairwise(slides)), strict=True):
+            part, touching = set(held.grasp), set(held.contacts.values())
+            at_rest = (not moved and part <= end <= touching for end in ends)
+            given.append(part in ends or any(at_rest))
+        return tuple(given)
 
     def _least_chosen(self, held: Sequence[float], slides: Sequence[float]) -> float:
-        """The least over grasps that were free to choose and over slides.
+        """The least over grasps that were chosen and over slides.
 
         A slide from or to a given grasp counts where it falls below that grasp, beyond rounding;
         where other fingers take over there, it counts in any case.
@@ -243,15 +253,16 @@ class Plan:
 
     @cached_property
     def chosen_margin(self) -> float:
-        """The least margin over what was free to choose; inf if nothing was.
+        """The least margin over what was chosen; inf if nothing was.
 
-        Start and goal are given, and a slide from or to them counts only where it falls below them.
+        Start and goal are given, each as a whole: with some of its contacts released, or not placed
+        yet, it is a choice. A slide from or to them counts only where it falls below them.
         """
         return self._least_chosen(self.margins, self.slide_margins)
 
     @cached_property
     def chosen_tolerance(self) -> float:
-        """The least tolerance over what was free to choose; inf if nothing was."""
+        """The least tolerance over what was chosen; inf if nothing was."""
         held = [grasp.tolerance for grasp in self.grasps]
         return self._least_chosen(held, self.slide_tolerances)
 

@@ -215,7 +215,7 @@ class PlanningProblem:
         first, last = (supports(rows, self.sets, grasp) for grasp in (start, goal))
         search = WidestProblem(rows, moves, self.hand, self.solver, first, last)
         routes = WidestRoutes(search, steering.through)
-        found = replace(routes.best, bound=self._bound(routes.best, start, goal, objective))
+        found = replace(routes.best, bound=self._bound(routes.best, search, start, goal))
         if self.hand.coupled:
             # Routes do not know of limits between fingers: these are bounds only.
             found = replace(found, route=None)
@@ -240,20 +240,26 @@ class PlanningProblem:
             failed = 0
             yield replace(plan, objective=objective, bound=best.bound)
 
-    def _bound(self, found: Widest, start: Grasp, goal: Grasp, objective: Objective) -> float:
-        """The bound of a search, for margins as grasps have them.
+    def _bound(self, found: Widest, search: WidestProblem, start: Grasp, goal: Grasp) -> float:
+        """The bound of a search, for margins as grasps have them, and whatever touches.
 
         The functions of a parallel set are the chapter's, with margins below those of its grasps;
-        so the bound is that of the same search with all functions of its edges.
+        so the bound is that of the same search with all functions of its edges. And of the
+        chapter's sets none may hold all of the start or the goal (`WidestProblem.loosened`).
         """
         families = self.sets.families
-        if all(family.kind != "parallel" for family in families) or np.isinf(found.bound):
+        kinds = {family.kind for family in families}
+        if np.isinf(found.bound) or not kinds & {"concurrent", "parallel"}:
             return found.bound
-        every = [torque_functions(f.functions.cones, f.functions.edges) for f in families]
-        rows = PieceRows(every, "margin" if objective.name == "margin" else "tolerance")
-        moves = KnownMoves(rows, remembered(self.switches), self.hand)
-        first, last = (supports(rows, self.sets, grasp) for grasp in (start, goal))
-        return WidestProblem(rows, moves, self.hand, self.solver, first, last).solve().bound
+        problem = search
+        if "parallel" in kinds:
+            every = [torque_functions(f.functions.cones, f.functions.edges) for f in families]
+            rows = PieceRows(every, search.rows.measure)
+            moves = KnownMoves(rows, remembered(self.switches), self.hand)
+            first, last = (supports(rows, self.sets, grasp) for grasp in (start, goal))
+            problem = replace(search, rows=rows, moves=moves, starts=first, goals=last, _cuts={})
+        problem = problem.loosened()
+        return found.bound if problem is search else problem.solve().bound
 
     def _cheapest(
         self, start: Grasp, goal: Grasp, aligning: str, objective: Objective, steering: Steering

@@ -9,7 +9,7 @@ attained meet at the optimum: no branching, no integers.
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from functools import cached_property
 from itertools import product
 
@@ -48,7 +48,7 @@ class Widest:
     route : Route or None
         None if none was found.
     level : float
-        The least margin or tolerance of what could be chosen on it; inf if there is no choice.
+        The least margin or tolerance of what is chosen on it; inf if nothing is.
     bound : float
         No route has a larger one.
     searches : int
@@ -115,8 +115,8 @@ class WidestProblem:
         accuracy = self._accuracy(bound)
         best: Route | None = None
         level, given_up, searches = 0.0, 0, 0
-        # At the bound itself, where most optima are; then in the middle of what is left, and just
-        # above the best level so far, in turns.
+        # At the bound itself, where most optima are; then in the middle of what is left (or where
+        # a part of start or goal is the limit), and just above the best level so far, in turns.
         trial = bound
         while bound - level > accuracy and bound > _LEAST * self.rows.cones.size:
             search = self.search(trial)
@@ -131,11 +131,17 @@ class WidestProblem:
                 given_up += 1
             if given_up == _PATIENT:
                 break
-            middle = (level + bound) / 2
+            middle = self._middle(level + accuracy, bound - accuracy)
             trial = middle if searches % 2 else min(level + accuracy, bound)
             if given_up:  # neither yes nor no: a lower level may be easier
                 trial = (level + trial) / 2
         return Widest(best, level if best is not None else -np.inf, max(bound, level), searches)
+
+    def _middle(self, low: float, high: float) -> float:
+        """The middle of two levels, or the nearest to it at which a way over a part of an end ends."""
+        middle = (low + high) / 2
+        limits = [s.limit for s in (*self.starts, *self.goals) if low < s.limit < high]
+        return min(limits, key=lambda limit: abs(limit - middle), default=middle)
 
     def _accuracy(self, bound: float) -> float:
         """How near to each other levels are told apart."""
@@ -151,7 +157,9 @@ class WidestProblem:
     def _attained(self, route: Route) -> float:
         problem = self.path_problem(route)
         x = largest_tolerance(problem, self.solver.name)
-        return problem.tolerance(x) * self.rows.cones.size
+        ends = (route.start, route.legs[0].pieces[:1]), (route.goal, route.legs[-1].pieces[-1:])
+        chosen = [end.level_in(piece) for end, pieces in ends for piece in pieces if end.chosen]
+        return min(problem.tolerance(x) * self.rows.cones.size, *chosen, np.inf)
 
     def path_problem(self, route: Route) -> PathProblem:
         """Return the path LP of a route."""
@@ -165,11 +173,25 @@ class WidestProblem:
         """Return the best grasps along a route, per leg: leximin, then least travel."""
         return solve_path_problem(self.path_problem(route), self.solver.name, leximin=True)
 
+    def loosened(self) -> WidestProblem:
+        """Return the problem in which parts of start and goal do not count that need not.
+
+        While all contacts of the start touch, a part of it may hold the object until what comes
+        next is placed; and the same backwards from the goal. Of complete sets there is one for the
+        whole, which can then be switched as well; among others there may be none.
+        """
+        starts = _loosened(self.starts, self.moves, self.hand)
+        goals = _loosened(self.goals, self.back or self.moves, self.hand)
+        if not any(old != new for old, new in zip((*self.starts, *self.goals), (*starts, *goals), strict=True)):
+            return self
+        return replace(self, starts=starts, goals=goals)
+
     def directs(self) -> list[Route]:
         """Return the ways from start to goal on which no grasp is chosen."""
         return [
             route
             for start, goal in product(self.starts, self.goals)
+            if not (start.chosen or goal.chosen)
             for route in (self._one_slide(start, goal), self._one_switch(start, goal))
             if route is not None
         ]
@@ -196,6 +218,22 @@ class WidestProblem:
             return None
         legs = Leg(start.index, ()), Leg(goal.index, ())
         return Route(legs, (held,), start, goal, len(theirs) - len(held) + goal.others)
+
+
+def _loosened(ends: Sequence[Support], moves: Moves, hand: Hand) -> list[Support]:
+    """The supports of start or goal; those count for nothing that can do what the whole cannot."""
+    whole = [c.others for s in ends if not s.chosen for c in moves.of(s.index)]
+    reached = np.concatenate((*whole, np.zeros(0, dtype=np.intp)))
+    found = []
+    for support in ends:
+        free = False
+        for contacts in moves.of(support.index) if support.chosen else ():
+            contacts_there = support.rows.contacts[contacts.others]
+            touching = len(support.fractions) + contacts_there - contacts.held
+            beside = touching <= hand.fingers  # other contacts of the given grasp may be theirs
+            free |= not np.isin(contacts.others[beside], reached).all()
+        found.append(replace(support, chosen=False) if free else support)
+    return found
 
 
 def _places(support: Support) -> tuple[list[int], list[float]]:
