@@ -6,9 +6,12 @@ no fonts, and figures are files of this folder, drawn by ``gallery.py``.
 
 from __future__ import annotations
 
+import re
 import shutil
 import sys
 from pathlib import Path
+
+from sphinx.application import Sphinx
 
 import regrasp_lp
 
@@ -33,6 +36,7 @@ extensions = [
     "sphinx.ext.napoleon",
     "sphinx.ext.viewcode",
     "command_help",
+    "docstrings",
     "mathml",
 ]
 source_suffix = {".md": "myst-nb", ".ipynb": "myst-nb"}
@@ -82,3 +86,12 @@ html_theme_options = {
         "color-brand-visited": "#b9a6e6",
     },
 }
+
+
+def setup(app: Sphinx) -> None:
+    """Links to notebooks, which lead out of this folder where pages are read in the repository."""
+
+    def inside(app: Sphinx, page: str, source: list[str]) -> None:
+        source[0] = re.sub(r"\]\(\.\./((?:\.\./)*notebooks/)", r"](\1", source[0])
+
+    app.connect("source-read", inside)

@@ -2,15 +2,16 @@
 
     python docs/gallery.py [FOLDER]
 
-Needs the extra "plot". A picture of a page is what the page's own examples save under its name;
-those of the theory are in `theory_figures`. The plan at the top of the README is that of its first
-command.
+Needs the extras "plot", "dxf" and "svg". A picture of a page is what the page's own examples save
+under its name; those of the theory are in `theory_figures`, and the plan at the top of the README
+is that of its first command.
 """
 
 from __future__ import annotations
 
 import os
 import re
+import shlex
 import shutil
 import sys
 import tempfile
@@ -20,7 +21,10 @@ import matplotlib
 import snippets
 from theory_figures import FIGURES
 
+from regrasp_lp.cli import main as command
+
 DOCS = Path(__file__).resolve().parent
+FIRST = re.compile(r"<!-- main-command -->\n```bash\n[^`]*regrasp-lp (plan .*?) --json")
 SHOWN = re.compile(r"\]\((?:\.\./)?(images|static)/([\w-]+\.(?:png|gif|html))\)")
 
 
@@ -42,6 +46,13 @@ def draw(page: Path, target: Path) -> None:
         os.chdir(DOCS)
 
 
+def first_command() -> list[str]:
+    """Return the arguments of the README's first command, but for the files that it writes."""
+    found = FIRST.search((DOCS.parent / "README.md").read_text(encoding="utf-8"))
+    assert found is not None, "the README has no first command"
+    return shlex.split(found[1])
+
+
 def main(target: Path = DOCS) -> None:
     """Write all pictures to the folders `images` and `static` of a folder."""
     target = target.resolve()
@@ -50,8 +61,13 @@ def main(target: Path = DOCS) -> None:
     for page in sorted(DOCS.rglob("*.md")):
         if drawn_by(page):
             draw(page, target)
+    os.chdir(DOCS.parent)
+    images = target / "images"
+    command(
+        [*first_command(), "--plot", str(images / "plan.png"), "--gif", str(images / "plan.gif")]
+    )
     for name, figure in FIGURES.items():
-        figure().savefig(target / "images" / f"{name}.png")
+        figure().savefig(images / f"{name}.png")
 
 
 if __name__ == "__main__":

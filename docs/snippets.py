@@ -50,7 +50,16 @@ def run(page: Path) -> list[tuple[Example, str]]:
 
 
 def alike(shown: str, printed: str) -> bool:
-    """Whether two texts have the same words; numbers are equal to 1 %, and ``...`` to any word."""
+    """Whether two texts have the same words in every line.
+
+    Numbers are equal to 1 %, and ``...`` is to any word. A paragraph that is broken at spaces, for
+    numbers may be a digit longer elsewhere, is one line: the following lines are indented.
+    """
+    one, other = (re.sub(r"\n +(?=\S)", " ", text.strip()).split("\n") for text in (shown, printed))
+    return len(one) == len(other) and all(map(_alike, one, other))
+
+
+def _alike(shown: str, printed: str) -> bool:
     words, others = (_BETWEEN_WORDS.split(text.strip()) for text in (shown, printed))
     return len(words) == len(others) and all(map(_same, words, others))
 

@@ -99,26 +99,14 @@ def build_switching_graph(
     (10, 1)
     """
     hand = check_options(hand, sets, switching, min_margin, solver)
-    kinds, backend = kinds_of(sets), get_solver(solver)
+    options = GraphOptions(sets, switching, float(min_margin), solver, presolve)
     seconds, started = {}, time.perf_counter()
-    cones = hand_cones(polygon, friction, hand)
-    families = tuple(
-        build_family(
-            cones, kind, backend, presolve=presolve, min_margin=min_margin, progress=progress
-        )
-        for kind in kinds
-    )
-    spacing = spacing_of(cones, hand)
-    if spacing is not None:
-        families = tuple(
-            spaced_family(family, spacing, backend, min_margin=min_margin) for family in families
-        )
-    grasp_sets = GraspSets(polygon, families, spacing)
+    grasp_sets = find_sets(polygon, friction, hand, options, progress)
     seconds["sets"] = time.perf_counter() - started
 
     started = time.perf_counter()
     rule = switch_rule(
-        grasp_sets, hand, backend, switching, presolve=presolve, min_margin=min_margin
+        grasp_sets, hand, get_solver(solver), switching, presolve=presolve, min_margin=min_margin
     )
     switches: Switches
     if rule.n_pairs > STORE_LIMIT:
@@ -126,8 +114,43 @@ def build_switching_graph(
     else:
         switches = StoredSwitches.of_pairs(len(grasp_sets), rule.pairs(progress))
     seconds["switches"] = time.perf_counter() - started
-    options = GraphOptions(sets, switching, float(min_margin), solver, presolve)
-    return SwitchingGraph(grasp_sets, switches, cones.whole.friction, hand, options, seconds)
+    mu = grasp_sets.cones.whole.friction
+    return SwitchingGraph(grasp_sets, switches, mu, hand, options, seconds)
+
+
+def find_sets(
+    polygon: Polygon,
+    friction: ArrayLike,
+    hand: Hand,
+    options: GraphOptions,
+    progress: Progress | None = None,
+) -> GraspSets:
+    """Return the grasp sets of an object for a hand, without the switches between them.
+
+    Parameters
+    ----------
+    polygon, friction, hand, progress
+        As for `build_switching_graph`.
+    options : GraphOptions
+
+    Returns
+    -------
+    GraspSets
+    """
+    solver, least = get_solver(options.solver), options.min_margin
+    cones = hand_cones(polygon, friction, hand)
+    families = tuple(
+        build_family(
+            cones, kind, solver, presolve=options.presolve, min_margin=least, progress=progress
+        )
+        for kind in kinds_of(options.sets)
+    )
+    spacing = spacing_of(cones, hand)
+    if spacing is not None:
+        families = tuple(
+            spaced_family(family, spacing, solver, min_margin=least) for family in families
+        )
+    return GraspSets(polygon, families, spacing)
 
 
 def check_options(

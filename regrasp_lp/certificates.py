@@ -59,6 +59,19 @@ def save_certificates(graph: SwitchingGraph, path: str | Path) -> None:
         If the graph was built with another rule or a margin.
     SolverError
         If the graph says what is not so: there is no proof of that (`certify` lists it).
+
+    Examples
+    --------
+    >>> import tempfile
+    >>> import regrasp_lp as rl
+    >>> from regrasp_lp.check_certificates import check
+    >>> block = rl.Polygon([(0, 0), (6, 0), (6, 3), (0, 3)])
+    >>> graph = rl.build_switching_graph(block, friction=0.4)
+    >>> with tempfile.TemporaryDirectory() as folder:
+    ...     save_certificates(graph, f"{folder}/block.proof")
+    ...     report = check(f"{folder}/block.proof")
+    >>> report.kinds, report.yes, report.no
+    ({'two_finger': (2, 2), 'three_finger': (8, 8)}, 44, 0)
     """
     report = certify(graph)
     if not report.ok:

@@ -11,7 +11,7 @@ from __future__ import annotations
 
 import math
 import time
-from collections.abc import Iterator, Set
+from collections.abc import Callable, Iterator, Set
 from dataclasses import dataclass, field, replace
 from itertools import pairwise
 
@@ -22,6 +22,7 @@ from regrasp_lp.contact import Grasp
 from regrasp_lp.friction import Cones, FloatArray
 from regrasp_lp.graph_options import GraphOptions
 from regrasp_lp.grasp_sets.candidates import two_finger_candidates
+from regrasp_lp.planning.fingers import Fingers
 from regrasp_lp.planning.hand import Hand
 from regrasp_lp.planning.on_demand import path_on_demand
 from regrasp_lp.planning.search import fewest_placements
@@ -167,14 +168,18 @@ def _plainly_joined(question: Regrasp) -> bool:
 
 
 def _route_in(graph: SwitchingGraph, start: Grasp, goal: Grasp) -> Route | None:
-    sets, hand = graph.sets, graph.hand
-    sources = dict.fromkeys(graph.locate(start), 0)
-    targets = {i: len(goal) - len(chosen) for i, chosen in sets.holding(goal)}
+    sets, hand, fingers = graph.sets, graph.hand, Fingers(graph.sets, graph.hand)
+    passable = fingers.passable(start)
+    margins = sets.margins if passable is None else np.where(passable, sets.margins, -np.inf)
+    sources = {i: 0 for i, _ in fingers.starts(start) if margins[i] > -np.inf}
+    targets = {
+        i: len(goal) - len(chosen) for i, chosen in fingers.goals(goal) if margins[i] > -np.inf
+    }
     if not sources or not targets:
         return None
-    if isinstance(graph.switches, SwitchesOnDemand):
+    if isinstance(graph.switches, SwitchesOnDemand) and passable is None:
         return Route((), None) if _joined_in(graph, sources.keys(), targets.keys()) else None
-    path = fewest_placements(sets.contacts, sets.margins, graph.switches, hand, sources, targets)
+    path = fewest_placements(sets.contacts, margins, graph.switches, hand, sources, targets)
     if path is None:
         return None
     held = (graph.held(i, j) or 0 for i, j in pairwise(path))
@@ -267,12 +272,42 @@ def friction_threshold(question: Regrasp, progress: Progress | None = None) -> F
     -------
     FrictionThreshold
     """
-    highest = float(question.friction.max())
+
+    def joined(friction: FloatArray) -> bool:
+        return route(replace(question, friction=friction)) is not None
+
+    return first_friction(question.friction, joined, question.monotone, progress)
+
+
+def first_friction(
+    friction: FloatArray,
+    joined: Callable[[FloatArray], bool],
+    monotone: bool,
+    progress: Progress | None = None,
+) -> FrictionThreshold:
+    """Return the friction at which something is first joined.
+
+    Parameters
+    ----------
+    friction : numpy.ndarray, shape (n_edges,)
+        At which it is not.
+    joined : callable
+        Decides at another one.
+    monotone : bool
+        Whether what is joined stays so as friction grows.
+    progress : callable, optional
+        Told which friction is being tried.
+
+    Returns
+    -------
+    FrictionThreshold
+    """
+    highest = float(friction.max())
     most = min(max(_WIDEST / highest, _LEAST_RANGE), _LARGEST / highest)
-    trial = _Trial(question, progress)
+    trial = _Trial(friction, joined, progress)
     grid: Iterator[float] = iter(())  # there may be no friction that is larger
     if most > 1:
-        grid = _doubling(most) if question.monotone else _steps(most)
+        grid = _doubling(most) if monotone else _steps(most)
     below, above = 1.0, None
     for factor in grid:
         if trial.ended:
@@ -287,12 +322,12 @@ def friction_threshold(question: Regrasp, progress: Progress | None = None) -> F
     close = above is not None and above <= below * (1 + _ACCURACY)
     ended = trial.ended and not close and not (above is None and below == most)
     return FrictionThreshold(
-        question.friction,
+        friction,
         below,
         above,
         most,
         ended,
-        question.monotone,
+        monotone,
         (1.0, *sorted(trial.tried)),
     )
 
@@ -301,7 +336,8 @@ def friction_threshold(question: Regrasp, progress: Progress | None = None) -> F
 class _Trial:
     """Decides at one friction after the other, and notes at which."""
 
-    question: Regrasp
+    friction: FloatArray
+    decide: Callable[[FloatArray], bool]
     progress: Progress | None
     tried: list[float] = field(default_factory=list)
     started: float = field(default_factory=time.monotonic)
@@ -315,8 +351,7 @@ class _Trial:
         if self.progress is not None:
             self.progress(f"trying {factor:.4g} times the friction", 0, 0)
         self.tried.append(factor)
-        friction = np.minimum(self.question.friction * factor, _LARGEST)
-        return route(replace(self.question, friction=friction)) is not None
+        return self.decide(np.minimum(self.friction * factor, _LARGEST))
 
 
 def _doubling(most: float) -> Iterator[float]:

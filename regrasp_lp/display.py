@@ -76,10 +76,12 @@ def plan_html(plan: Plan) -> str:
     picture = _svg(plan.plot) or ""
     account = html.escape(str(plan))
     page = html.escape(plan.to_html(), quote=True)
-    style = 'style="width:100%;height:48em;border:1px solid #ccc"'
+    # its script is to reach nothing of the notebook
+    frame = "loading='lazy' sandbox='allow-scripts' "
+    frame += 'style="width:100%;height:48em;border:1px solid #ccc"'
     return (
         f'<div style="max-width:72em">{_scaled(picture)}<pre>{account}</pre><details><summary>step '
-        f"through it</summary><iframe {style} loading='lazy' srcdoc=\"{page}\"></iframe>"
+        f'through it</summary><iframe {frame} srcdoc="{page}"></iframe>'
         "</details></div>"
     )
 

@@ -91,6 +91,11 @@ class Explanation:
     among_all : Route or None
         A path among all force-closure grasps, where only some sets or switches were considered;
         None also if there is none.
+    standstill : str or None
+        What fingers of the hand that only slide rule out; there are no `ends` then.
+    without : mapping of str to Route or None, optional
+        For each limit of the hand the path that a hand without it could take, if there is one;
+        None for a hand without limits.
     """
 
     start: Grasp
@@ -106,6 +111,8 @@ class Explanation:
     threshold: FrictionThreshold | None = None
     fingers: MoreFingers | None = None
     among_all: Route | None = None
+    standstill: str | None = None
+    without: Mapping[str, Route | None] | None = None
 
     @property
     def plan_exists(self) -> bool:
@@ -120,12 +127,13 @@ class Explanation:
         for role, found in self.remedies.items():
             grasp = contacts_text(self.start if role == "start" else self.goal)
             entries.append((role, f"{grasp}: {found}"))
-        if self.route is None and self.ends:
+        if self.route is None and (self.ends or self.standstill):
             entries += self.ends.items()
-            if not self._in_no_set:
+            if self.ends and not self._in_no_set:
                 entries.append(("switch", self._switch_text()))
             entries += [("friction", self.threshold)] if self.threshold else []
             entries += [("fingers", self.fingers)] if self.fingers else []
+            entries += [("hand", self._hand_text(self.without))] if self.without else []
             entries += [("sets", self._sets_text())] if not self.options.everything else []
         head = textwrap.fill(self._headline(), _WIDTH)
         return "\n".join([head, *(_entry(label, text) for label, text in entries)])
@@ -141,13 +149,15 @@ class Explanation:
         if self.remedies:
             verb = "is" if len(self.remedies) == 1 else "are"
             return f"No plan: {_roles(self.remedies)} {verb} not in force closure."
+        if self.standstill:
+            return f"No plan: {self.standstill}."
         kind = f"{self.n_sets} {self.options.sets} sets"
         if self._in_no_set:
             verb = "is" if len(self._in_no_set) == 1 else "are"
             return f"No plan: {_roles(self._in_no_set)} {verb} in none of the {kind}."
         return (
             f"No plan: no switches lead from the start to the goal; the {kind} are in "
-            f"{self.n_components} components."
+            f"{count(self.n_components or 0, 'component')}."
         )
 
     def _switch_text(self) -> str:
@@ -169,6 +179,16 @@ class Explanation:
             f"{_edges(near.held)}, with a margin of {near.margin:.4g}: "
             f"{_positions(near.grasps[0])} and {_positions(near.grasps[1])}{rule}"
         )
+
+    @staticmethod
+    def _hand_text(without: Mapping[str, Route | None]) -> str:
+        reliefs = [
+            f"without {limit} there is a plan{_placements(found)}"
+            for limit, found in without.items()
+            if found is not None
+        ]
+        each = ", or without ".join(without)
+        return ", ".join(reliefs) or f"without {each} there is no plan either"
 
     def _sets_text(self) -> str:
         if self.among_all is None:

@@ -8,11 +8,14 @@ from __future__ import annotations
 import errno
 import json
 import os
+import re
 import secrets
 import shutil
 from collections.abc import Iterable, Iterator, Mapping
 from pathlib import Path
 from typing import Any, NamedTuple
+
+import numpy as np
 
 from regrasp_lp.errors import FileFormatError, OptionError, PolygonError
 from regrasp_lp.outlines.drawing import Piece, Reading, outlines
@@ -23,6 +26,9 @@ from regrasp_lp.polygon import Polygon
 from regrasp_lp.wkt import looks_like_wkt, parse_wkt
 
 __all__ = ["read_polygons", "write_atomically"]
+
+_POINT = re.compile(r"\(-?[\d.]+(e[+-]\d+)?, -?[\d.]+(e[+-]\d+)?\)")
+"""A point as messages have it."""
 
 
 class _Feature(NamedTuple):
@@ -156,9 +162,9 @@ def _read_features(path: Path, reading: Reading) -> list[_Feature]:
     if looks_like_dxf(data):
         return _drawn(read_dxf(path, reading), reading)
     if looks_like_svg(data):
-        return _drawn(read_svg(data, reading), reading)
+        return _upright(read_svg(data, reading), reading)
     if reading.layers is not None or reading.ignore:
-        raise OptionError("is no drawing: layers and ignore are for DXF and SVG")
+        raise OptionError("is no drawing: layers=... and ignore=... are for DXF and SVG")
     try:
         return _features(data.decode("utf-8-sig"))
     except UnicodeDecodeError as error:
@@ -171,6 +177,19 @@ def _drawn(pieces: list[Piece], reading: Reading) -> list[_Feature]:
     except PolygonError as error:
         raise FileFormatError(str(error)) from error
     return [_Feature(outline.entity, outline.name, [outline.rings]) for outline in found]
+
+
+def _upright(pieces: list[Piece], reading: Reading) -> list[_Feature]:
+    """What is drawn with the y axis down, turned up; messages have the coordinates of the file."""
+    try:
+        found = _drawn(pieces, reading)
+    except FileFormatError as error:
+        down = " (coordinates as in the file: y points down)" * bool(_POINT.search(str(error)))
+        raise FileFormatError(f"{error}{down}") from error
+    up = np.array([1.0, -1.0])
+    return [
+        one._replace(parts=[[ring * up for ring in part] for part in one.parts]) for one in found
+    ]
 
 
 def _features(text: str) -> list[_Feature]:

@@ -43,7 +43,8 @@ def sample_grasps(
         The same seed gives the same grasps.
     proposal : {"uniform", "mixed"}
         With "uniform" all sets of edges, and all places on an edge, are equally likely: the grasps
-        are spread evenly over the volume of contact space that is in force closure. "mixed" aims
+        are spread evenly over what is in force closure of contact space, measured in fractions of
+        edges (a set of short edges gets as many as one of long edges). "mixed" aims
         (`regrasp_lp.random_grasps`), and finds grasps under low friction sooner.
     max_draws : int, optional
         Draws after which fewer grasps will do, by default 1000 times `count`.

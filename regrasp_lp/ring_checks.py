@@ -17,7 +17,14 @@ import numpy.typing as npt
 from regrasp_lp.errors import PolygonError
 from regrasp_lp.rings import Point, doubled_area, exact_integers, format_point
 
-__all__ = ["MAX_EXTENT", "MIN_EXTENT", "check_rings", "conflicts", "nesting"]
+__all__ = [
+    "MAX_EXTENT",
+    "MIN_EXTENT",
+    "check_rings",
+    "conflicts",
+    "first_conflict",
+    "nesting",
+]
 
 MIN_EXTENT = 1e-100
 """Least width and height of a ring: below, products of lengths run out of the double range."""
@@ -28,6 +35,8 @@ _FILTER = 4.0 * 2.0**-53
 """Shewchuk's bound on the relative error of an orientation, (3 + 16u)u, rounded up."""
 _BLOCK = 1 << 20
 """Edge pairs compared at once; bounds the memory for outlines of thousands of edges."""
+_ROWS = 128
+"""Consecutive edges whose common box leaves out most others: they are near to each other."""
 
 _Floats: TypeAlias = npt.NDArray[np.float64]
 
@@ -75,9 +84,12 @@ def conflicts(rings: Sequence[_Floats]) -> list[tuple[int, int]]:
     >>> conflicts([np.array([[0.0, 0.0], [2.0, 2.0], [2.0, 0.0], [0.0, 2.0]])])
     [(0, 2)]
     """
-    edges = _Edges(rings, "")
-    meeting = [pair for pair in edges.meeting_candidates() if edges.meet(*pair)]
-    return [*edges.spikes(), *meeting]
+    return list(_Edges(rings, "").conflicts())
+
+
+def first_conflict(rings: Sequence[_Floats]) -> tuple[int, int] | None:
+    """Return the first of the `conflicts`, which may be very many, or None."""
+    return next(_Edges(rings, "").conflicts(), None)
 
 
 def nesting(rings: Sequence[_Floats]) -> npt.NDArray[np.bool_]:
@@ -177,6 +189,11 @@ class _Edges:
             ):
                 yield i, j
 
+    def conflicts(self) -> Iterator[tuple[int, int]]:
+        """Pairs of edges that share more than the vertex between neighbours."""
+        yield from self.spikes()
+        yield from (pair for pair in self.meeting_candidates() if self.meet(*pair))
+
     def check_spikes(self) -> None:
         """Refuse an edge that folds back onto the one before."""
         for i, j in self.spikes():
@@ -188,15 +205,18 @@ class _Edges:
     def meeting_candidates(self) -> Iterator[tuple[int, int]]:
         """Pairs i < j of edges, not neighbours, that floats do not prove apart."""
         n = len(self.start)
-        rows = max(1, _BLOCK // n)
+        rows = max(1, min(_ROWS, _BLOCK // n))
         for top in range(0, n, rows):
             block = np.arange(top, min(top + rows, n))[:, None]
-            near = np.arange(n) > block
+            low, high = self.low[block].min(axis=0), self.high[block].max(axis=0)
+            by_box = (self.low[top:] <= high) & (low <= self.high[top:])
+            others = top + np.flatnonzero(by_box.all(axis=1))
+            near = others > block
             for axis in (0, 1):
-                near &= self.low[block, axis] <= self.high[:, axis]
-                near &= self.low[:, axis] <= self.high[block, axis]
+                near &= self.low[block, axis] <= self.high[others, axis]
+                near &= self.low[others, axis] <= self.high[block, axis]
             i, j = np.nonzero(near)
-            i = i + top
+            i, j = i + top, others[j]
             apart = (self.following[i] == j) | (self.following[j] == i)
             for e, f in ((i, j), (j, i)):
                 a, b = self.start[e], self.end[e]
@@ -231,13 +251,19 @@ class _Edges:
         One point a ring decides: it is inside a ring iff a ray to the right crosses an odd
         number of the ring's edges.
         """
-        p = self.start[self.first, None, :]
+        rows = max(1, _BLOCK // len(self.start))
+        blocks = np.split(np.arange(len(self.first)), range(rows, len(self.first), rows))
+        return np.concatenate([self._inside(block) for block in blocks])
+
+    def _inside(self, rings: npt.NDArray[np.intp]) -> npt.NDArray[np.bool_]:
+        """The rows of some rings."""
+        p = self.start[self.first[rings], None, :]
         upward = self.start[:, 1] < self.end[:, 1]
         crossed = (self.start[:, 1] > p[..., 1]) != (self.end[:, 1] > p[..., 1])
-        crossed &= self.ring != np.arange(len(self.first))[:, None]
+        crossed &= self.ring != rings[:, None]
         sign = _turn_signs(self.start, self.end, p)
         for r, i in zip(*(k.tolist() for k in np.nonzero(crossed & (sign == 0))), strict=True):
-            point, _ = self.exact(int(self.first[r]))
+            point, _ = self.exact(int(self.first[rings[r]]))
             sign[r, i] = 1 if _turn(*self.exact(i), point) > 0 else -1
         crossed &= (sign > 0) == upward
         inside: npt.NDArray[np.bool_] = (

@@ -7,7 +7,7 @@ from dataclasses import replace
 from numpy.typing import ArrayLike
 
 from regrasp_lp.build import check_options
-from regrasp_lp.connection import Regrasp, friction_threshold, route
+from regrasp_lp.connection import Regrasp, Route, friction_threshold, route
 from regrasp_lp.contact import Grasp
 from regrasp_lp.errors import NotForceClosureError
 from regrasp_lp.explanation import End, Explanation, MoreFingers
@@ -16,8 +16,11 @@ from regrasp_lp.graph_options import GraphOptions
 from regrasp_lp.lp import get_solver
 from regrasp_lp.nearest_switch import NearestSwitch, nearest_switch
 from regrasp_lp.planning.hand import Hand
+from regrasp_lp.planning.relaxations import relaxations
 from regrasp_lp.planning.requests import GraspLike, checked_grasp
+from regrasp_lp.planning.stuck import stuck
 from regrasp_lp.polygon import Polygon
+from regrasp_lp.refusals import standstill
 from regrasp_lp.remedies import Remedy, remedy
 from regrasp_lp.switching_graph import Progress, SwitchingGraph
 
@@ -118,6 +121,9 @@ def _explained(question: Regrasp, graph: SwitchingGraph, progress: Progress | No
         return Explanation(start, goal, options, hand, n_sets=len(graph), route=found)
     ends = {"start": _end(graph, start), "goal": _end(graph, goal)}
     located = all(end.sets for end in ends.values())
+    reason = standstill(graph, start, goal) if located else None
+    # what fingers that only slide rule out at all friction cannot change
+    never = stuck(hand, start, goal) is not None
     if progress is not None and located:
         progress("looking for the nearest switch", 0, 0)
     return Explanation(
@@ -127,12 +133,20 @@ def _explained(question: Regrasp, graph: SwitchingGraph, progress: Progress | No
         hand,
         n_sets=len(graph),
         n_components=len(graph.components()),
-        ends=ends,
+        ends={} if reason else ends,
         nearest=_nearest(graph, ends) if located and not hand.coupled else None,
-        threshold=friction_threshold(question, progress),
+        threshold=None if never else friction_threshold(question, progress),
         fingers=_more_fingers(question) if located else None,
+        standstill=reason,
+        without=_without(question) if hand.limited else None,
         among_all=None if options.everything else route(question.with_all_sets()),
     )
+
+
+def _without(question: Regrasp) -> dict[str, Route | None]:
+    """The path that a hand without one of its limits could take, for each of them."""
+    relaxed = relaxations(question.hand)
+    return {limit: route(replace(question, hand=hand)) for limit, hand in relaxed.items()}
 
 
 def _end(graph: SwitchingGraph, grasp: Grasp) -> End:

@@ -146,11 +146,15 @@ class Oracle:
     sets : list of Functions
     fingers : int
     measure : {"margin", "tolerance"}
+    every : bool
+        Whether there is a set for every grasp. If not, all of a given one may touch while a set
+        holds the object that has some of its contacts.
     """
 
     sets: list[Functions]
     fingers: int
     measure: str
+    every: bool = True
     programs: int = 0
     _widths: dict[object, float] = field(default_factory=dict)
 
@@ -236,11 +240,7 @@ class Oracle:
 
     def choices(self, one: int, other: int, held: int) -> Iterator[Slots]:
         """All ways to hold so many contacts between two sets; contacts of an edge in order."""
-        e, g = self.sets[one].edges, self.sets[other].edges
-        for here in combinations(range(len(e)), held):
-            for there in combinations(range(len(g)), held):
-                if all(e[a] == g[b] for a, b in zip(here, there, strict=True)):
-                    yield tuple(zip(here, there, strict=True))
+        yield from matchings(self.sets[one].edges, self.sets[other].edges, held)
 
     # --- given grasps ---------------------------------------------------------------------------
 
@@ -259,13 +259,16 @@ class Oracle:
         return found
 
     def given(self, support: Given, piece: Piece) -> float:
-        """The largest level at which a piece of its set is reached from a given grasp."""
-        index, u, _ = support
+        """The largest level at which a piece of its set is reached from a given grasp.
+
+        Part of a given grasp counts itself, so that a slide to where it is better gains nothing.
+        """
+        index, u, others = support
         f = self.sets[index]
         values = f.values(u, self.measure)
         level = f.level(u, self.measure)
-        inside = min(level, -values[piece[1]], values[piece[2]])
-        return max(float(inside), self.landing(f, u, level, piece))
+        inside = float(min(level, -values[piece[1]], values[piece[2]]))
+        return inside if others else max(inside, self.landing(f, u, level, piece))
 
     def landing(self, f: Functions, u: np.ndarray, level: float, piece: Piece) -> float:
         """The largest level on a piece where it is seen from u: at least as good, or -inf."""
@@ -301,11 +304,23 @@ class Oracle:
 
     def onward(self, support: Given, piece: Piece, held: int) -> float:
         """The largest level on a piece with so many contacts as in a given grasp."""
-        index, u, _ = support
+        index, u, others = support
+        limit = self.sets[index].level(u, self.measure) if others else np.inf
+        return min(self.beside(self.sets[index].edges, u, piece, held), limit)
+
+    def touching(self, grasp: rl.Grasp, piece: Piece) -> float:
+        """The largest level on a piece next to all contacts of a given grasp."""
+        n = len(self.sets[piece[0]].edges)
+        contacts = sorted(grasp, key=lambda c: (c.edge, c.position))
+        edges, u = tuple(c.edge for c in contacts), np.array([c.position for c in contacts])
+        return self.beside(edges, u, piece, max(0, len(edges) + n - self.fingers))
+
+    def beside(self, edges: tuple[int, ...], u: np.ndarray, piece: Piece, held: int) -> float:
+        """The largest level on a piece with so many contacts among some others."""
         other = self.sets[piece[0]]
         best = -np.inf
         n = len(other.edges)
-        for slots in self.choices(index, piece[0], held):
+        for slots in matchings(edges, other.edges, held):
             rows = self.rows(piece, list(range(n)), n)
             for here, there in slots:
                 row = np.zeros(n)
@@ -317,12 +332,10 @@ class Oracle:
 
     def direct(self, start: rl.Grasp, goal: rl.Grasp) -> bool:
         """Whether one slide or one switch will do, so that nothing is chosen."""
-        for (i, u, _), (j, v, _) in product(self.supports(start), self.supports(goal)):
-            mine = set(zip(self.sets[i].edges, u, strict=True))
-            theirs = set(zip(self.sets[j].edges, v, strict=True))
-            if len(mine | theirs) <= self.fingers:
-                return True
-            if i == j:
+        if len({*start, *goal}) <= self.fingers:
+            return True
+        for (i, u, a), (j, v, b) in product(self.supports(start), self.supports(goal)):
+            if i == j and not (a or b):
                 f = self.sets[i]
                 least = min(f.level(u, self.measure), f.level(v, self.measure))
                 if least_along(f, u, v, self.measure) >= least - 1e-9 * f.lengths.max():
@@ -343,6 +356,8 @@ class Oracle:
                         known = max(known, self.onward(support, piece, need))
                     if self.width(piece) > known + 1e-12 and index == support[0]:
                         known = max(known, self.given(support, piece))
+                    if support[2] and not self.every and self.width(piece) > known + 1e-12:
+                        known = max(known, self.touching(grasp, piece))
                     if known > floor:
                         found[piece] = known
         return found
@@ -444,6 +459,14 @@ class Oracle:
         return found
 
 
+def matchings(one: tuple[int, ...], other: tuple[int, ...], held: int) -> Iterator[Slots]:
+    """All ways to hold so many contacts on edges; contacts of an edge in order."""
+    for here in combinations(range(len(one)), held):
+        for there in combinations(range(len(other)), held):
+            if all(one[a] == other[b] for a, b in zip(here, there, strict=True)):
+                yield tuple(zip(here, there, strict=True))
+
+
 def _following(edges: tuple[int, ...], u: np.ndarray) -> Iterator[tuple[int, int, float, float]]:
     return zip(edges, edges[1:], u.tolist(), u.tolist()[1:], strict=False)
 
@@ -465,7 +488,11 @@ def widest_problem(
     """The search that a plan between two resolved grasps is made by."""
     rows = PieceRows(graph.sets.sources, measure)
     moves = KnownMoves(rows, graph.switches, graph.hand)
-    ends = [supports(rows, graph.sets, grasp) for grasp in (start, goal)]
+    every = graph.options.sets == "complete"
+    ends = [
+        supports(rows, graph.sets, grasp, graph.hand.fingers, every=every)
+        for grasp in (start, goal)
+    ]
     return WidestProblem(rows, moves, graph.hand, get_solver("highs"), *ends)
 
 
@@ -489,9 +516,10 @@ class Held:
 class Wanderer:
     """Random motions all of whose chosen grasps and slides reach a level.
 
-    A tree grows from each of two given grasps, by slides and switches to random grasps; where one
-    move joins the trees there is a plan of that level, whatever a search says. Force closure and
-    margins are those of `rl.margin` and `rl.tolerance`.
+    Part of a given grasp is one of them only if it reaches the level, too. A tree grows from each
+    of two given grasps, by slides and switches to random grasps; where one move joins the trees
+    there is a plan of that level, whatever a search says. Force closure and margins are those of
+    `rl.margin` and `rl.tolerance`.
     """
 
     polygon: rl.Polygon
@@ -509,7 +537,7 @@ class Wanderer:
         return found
 
     def given(self, grasp: rl.Grasp) -> list[Held]:
-        """The grasp itself and its pairs of contacts, where in force closure."""
+        """The grasp itself and those of its pairs of contacts that reach the level."""
         found = []
         for count in range(2, len(grasp) + 1):
             for chosen in combinations(sorted(grasp, key=lambda c: (c.edge, c.position)), count):
@@ -517,11 +545,12 @@ class Wanderer:
                 fractions = tuple(float(c.fraction or 0.0) for c in chosen)
                 if rl.is_force_closure(self.polygon, rl.Grasp(chosen), self.friction):
                     level = float(self.levels(np.array([edges]), np.array([fractions]))[0])
-                    found.append(Held(edges, fractions, level))
-        return found
+                    if len(chosen) == len(grasp) or level >= self.level:
+                        found.append(Held(edges, fractions, level))
+        return sorted(found, key=lambda held: -len(held.edges))
 
-    def tree(self, grasp: rl.Grasp, rounds: int, batch: int = 60) -> tuple[list[Held], int]:
-        """Grasps that are reached, and how many of them (the first ones) are given."""
+    def tree(self, grasp: rl.Grasp, rounds: int, batch: int = 60) -> list[Held]:
+        """Grasps that are reached, the given one first."""
         nodes = self.given(grasp)
         first = len(nodes)
         for number in range(rounds):
@@ -540,7 +569,7 @@ class Wanderer:
                 apart = len(new.places) == len(new.edges)
                 if apart and (not slide or self.slides(node, new)):
                     nodes.append(new)
-        return nodes, first
+        return nodes
 
     def drawn(self, node: Held, slide: bool, batch: int) -> tuple[np.ndarray, np.ndarray]:
         """Random grasps that one move may lead to; some contacts at ends of edges."""
@@ -579,10 +608,10 @@ class Wanderer:
 
     def arrives(self, start: rl.Grasp, goal: rl.Grasp, rounds: int) -> bool:
         """Whether random motions from start and goal meet."""
-        (ones, first), (others, last) = self.tree(start, rounds), self.tree(goal, rounds)
+        ones, others = self.tree(start, rounds), self.tree(goal, rounds)
         for i, one in enumerate(ones):
             for j, other in enumerate(others):
-                if i < first and j < last:
+                if i == j == 0:  # nothing would be chosen
                     continue
                 if len(one.places | other.places) <= self.fingers:
                     return True

@@ -181,7 +181,7 @@ def routes_of(
     problem = graph._problem
     rows = PieceRows(graph.sets.sources, measure)  # type: ignore[arg-type]
     moves = KnownMoves(rows, graph.switches, graph.hand)
-    first, last = (supports(rows, graph.sets, grasp) for grasp in (start, goal))
+    first, last = (supports(rows, graph.sets, grasp, 4) for grasp in (start, goal))
     return WidestRoutes(WidestProblem(rows, moves, graph.hand, problem.solver, first, last))
 
 
@@ -224,7 +224,10 @@ def test_every_path_from_poor_grasps_has_its_route() -> None:
     grasps = random_grasps(polygon, friction, np.random.default_rng(3), 40, 3)
     grasps.sort(key=lambda grasp: rl.margin(polygon, grasp, friction))
     for start, goal in combinations(map(polygon.resolve, grasps[:5]), 2):
-        ends = [graph.locate(grasp) for grasp in (start, goal)]
+        ends = [
+            [index for index, some in graph.sets.holding(grasp) if len(some) == len(grasp)]
+            for grasp in (start, goal)
+        ]
         every = [p for s, t in product(*ends) if s != t for p in nx.all_simple_paths(known, s, t)]
         found = [*islice(routes_of(graph, start, goal).in_order(), 40)]
         paths = [path_of(route(one)) for one in found if len(set(path_of(route(one)))) > 1]

@@ -52,7 +52,7 @@ def test_a_point_is_seen_iff_the_slide_there_stays_at_the_level(name: str, measu
     seen_points = hidden_points = 0
     grasps = random_grasps(polygon, friction, rng, 6, 3, at_vertices=0.3)
     for grasp in grasps + random_grasps(polygon, friction, rng, 3, 2, at_vertices=0.3):
-        for support in supports(rows, graph.sets, polygon.resolve(grasp)):
+        for support in supports(rows, graph.sets, polygon.resolve(grasp), 4):
             functions = graph.sets.functions(support.index)
             m = functions.m
             margins = functions.margins if measure == "margin" else functions.tolerances
@@ -106,7 +106,7 @@ def test_landings_are_the_best_of_all_pieces_that_are_seen(name: str) -> None:
     for grasp in random_grasps(polygon, friction, rng, 3, 3):
         resolved = polygon.resolve(grasp)
         given = {tuple(oracle.sets[i].edges): (i, u) for i, u, _ in oracle.supports(resolved)}
-        for support in supports(rows, graph.sets, resolved):
+        for support in supports(rows, graph.sets, resolved, 4):
             index, u = given[graph.sets[support.index].edges]
             f = oracle.sets[index]
             level = f.level(u, "margin")
@@ -128,7 +128,7 @@ def test_no_way_away_from_a_grasp_is_wider_than_its_cap(measure: str) -> None:
     wider = 0
     for contacts in (2, 3):
         for grasp in random_grasps(polygon, 0.3, rng, 5, contacts, at_vertices=0.2):
-            for support in supports(rows, graph.sets, polygon.resolve(grasp)):
+            for support in supports(rows, graph.sets, polygon.resolve(grasp), 4):
                 onward = [support.onward(choices).max() for choices in moves.of(support.index)]
                 assert support.cap(moves) == max(support.widest, *onward)
                 wider += max(onward) > support.widest

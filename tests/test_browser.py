@@ -19,12 +19,14 @@ from typing import Any
 
 import numpy as np
 import pytest
+import shapely
 
 import regrasp_lp as rl
 from regrasp_lp.friction import Cones
 from regrasp_lp.linear_sets import LinearSets
 from regrasp_lp.planning.reach import room
 from regrasp_lp.planning.search import fewest_placements
+from regrasp_lp.plotting.sight import visible_part
 from regrasp_lp.polytopes import corners
 
 NASTY = "</script><b onclick=alert(1)>\u2028 & \"'<!--"
@@ -224,7 +226,7 @@ def test_every_instant_is_that_of_the_plan(browser, plan, tmp_path):
         grasp = rl.Grasp([contacts[k] for k in plan.supports[i].fingers])
         size = 1e-7 * polygon.diameter
         assert margin == pytest.approx(rl.margin(polygon, grasp, plan.friction), abs=size)
-        left = room(plan.touchable, plan.hand, contacts.values())
+        left = room(plan.touchable, plan.hand, contacts)
         expected = min(rl.tolerance(polygon, grasp, plan.friction), left)
         assert tolerance == pytest.approx(expected, abs=size)
 
@@ -281,7 +283,8 @@ def test_focus_points(browser, chapter, plan, tmp_path):
 
 
 def inside(q: np.ndarray, ring: np.ndarray) -> np.ndarray:
-    """Whether points are in a convex polygon."""
+    """Whether points are in a convex polygon; some of its corners may coincide."""
+    ring = ring[np.hypot(*(np.roll(ring, -1, axis=0) - ring).T) > 1e-9]
     ahead = np.roll(ring, -1, axis=0) - ring
     offset = q[:, None] - ring
     sides = ahead[:, 0] * offset[..., 1] - ahead[:, 1] * offset[..., 0]
@@ -300,6 +303,62 @@ def balanced(polygon: rl.Polygon, friction: float, contacts: list, q: np.ndarray
         forces.append(np.sign(along)[:, None] * towards)
     turns = [a[:, 0] * b[:, 1] - a[:, 1] * b[:, 0] for a, b in pairwise((*forces, forces[0]))]
     return allowed & ((np.array(turns) > 0).all(axis=0) | (np.array(turns) < 0).all(axis=0))
+
+
+def test_cones_end_where_material_does(browser, workpieces, tmp_path):
+    polygon = workpieces["two_hole_plate"]
+    graph = rl.build_switching_graph(polygon, 0.4)
+    start = graph.sets[0].witness
+    browser.open(graph.plan(start, start).to_html(), tmp_path)
+    rng, cones = np.random.default_rng(2), Cones.of(polygon, 0.4)
+    code = "return arguments[0].map(([at, rays]) => regrasp.visiblePart(regrasp.outline, at, rays))"
+    edges = rng.integers(polygon.n_edges, size=30).tolist()
+    apexes = [polygon.points(edge, f) for edge, f in zip(edges, rng.uniform(size=30), strict=True)]
+    rays = [cones.unit_rays[[2 * edge, 2 * edge + 1]] for edge in edges]
+    asked = [[at.tolist(), pair.tolist()] for at, pair in zip(apexes, rays, strict=True)]
+    for at, pair, ring in zip(apexes, rays, browser.run(code, asked), strict=True):
+        drawn, known = map(shapely.Polygon, (ring, visible_part(polygon, at, pair)))
+        assert known.area > 0
+        assert drawn.symmetric_difference(known).area < 1e-9 * polygon.diameter**2
+
+
+def test_one_scroll_bar(browser, plan, chapter, tmp_path):
+    """Either lists scroll, and the page is seen as a whole, or the page does."""
+    lists = "['#account', '#detail', '#stage', '#map'].map((s) => document.querySelector(s))"
+    nested = f"{lists}.filter((e) => e && getComputedStyle(e).overflowY === 'auto').length"
+    whole = "document.documentElement.scrollHeight <= innerHeight"
+    for page, act in (
+        (plan.to_html(), "regrasp.go(3.5)"),
+        (chapter.to_html(), "regrasp.select(3)"),
+    ):
+        for size in ((1280, 900), (1280, 650), (1280, 480), (700, 640)):
+            browser.open(page, tmp_path, size)
+            browser.run(act)
+            assert browser.value(whole) == (browser.value(nested) == 1) == (size[1] in (900, 650))
+            if browser.value(whole):
+                last = "document.querySelector('#stage, #map').lastElementChild"
+                ends = browser.value(
+                    f"[{last}, {last}.parentElement].map((e) => e.getBoundingClientRect().bottom)"
+                )
+                assert ends[0] <= ends[1] + 1  # all of it is seen
+        browser.open(page, tmp_path, (1280, 900))
+        browser.run("document.querySelector('#text').open = true")
+        assert browser.value(nested) == 0
+    browser.open(plan.to_html(), tmp_path, (700, 640))  # as the documentation embeds it
+    assert browser.value("document.querySelector('#curves').getBoundingClientRect().bottom") <= 640
+
+
+def test_the_instant_in_words(browser, plan, tmp_path):
+    browser.open(plan.to_html(), tmp_path)
+    i = next(i for i, slide in enumerate(plan.slides) if slide is not None)
+    browser.run(f"regrasp.go({i} + 0.37)")
+    margin, tolerance = browser.value(
+        f"[regrasp.marginAt({i} + 0.37), regrasp.toleranceAt({i} + 0.37)]"
+    )
+    assert f"now margin {margin:.4g}, tolerance {tolerance:.4g}" in browser.text("#now")
+    assert f"given: {plan.chosen_margin:.4g} and {plan.chosen_tolerance:.4g}" in browser.text(
+        "#facts"
+    )
 
 
 @pytest.mark.parametrize("size", [DESKTOP, PHONE], ids=["desktop", "phone"])
@@ -357,6 +416,12 @@ def test_dark_and_print(browser, plan, tmp_path):
     assert browser.value(panels) == len(plan.grasps)
     pdf = browser.driver.execute_cdp_cmd("Page.printToPDF", {"printBackground": True})
     assert base64.b64decode(pdf["data"]).startswith(b"%PDF")
+    for is_open in (False, True):  # what was folded away is so again
+        browser.run(f"document.querySelector('#text').open = {str(is_open).lower()}")
+        browser.run("dispatchEvent(new Event('beforeprint'))")
+        assert browser.value("document.querySelector('#text').open") is True
+        browser.run("dispatchEvent(new Event('afterprint'))")
+        assert browser.value("document.querySelector('#text').open") is is_open
 
 
 def test_names_are_texts(browser, workpieces, tmp_path):
@@ -426,6 +491,52 @@ def test_keys_and_filters_of_a_graph(browser, chapter, tmp_path):
         from.dispatchEvent(new Event('change'))"""
     )
     assert browser.text("#chosen").startswith("Set 40: ")
+
+
+def test_numbers_of_sets(browser, bracket_graph, chapter, tmp_path):
+    from selenium.webdriver import ActionChains
+
+    def typed(**numbers: object) -> str:
+        for name, number in numbers.items():
+            browser.run(f"document.querySelector('#{name}').value = '{number}'")
+        browser.run("document.querySelector('#to').dispatchEvent(new Event('change'))")
+        return browser.text("#refused")
+
+    browser.open(bracket_graph.to_html(), tmp_path)
+    written = """const ask = CanvasRenderingContext2D.prototype, fill = ask.fillText, words = [];
+        ask.fillText = function (...all) { words.push(String(all[0])); fill.apply(this, all); };
+        const done = arguments[arguments.length - 1];
+        document.querySelector('#switches').dispatchEvent(new Event('change'));
+        const then = (call) => requestAnimationFrame(() => requestAnimationFrame(call));
+        then(() => { ask.fillText = fill; done(words); })"""
+    numbers = [str(i) for i in range(len(bracket_graph))]
+    assert sorted(browser.driver.execute_async_script(written), key=int) == numbers
+    assert typed(**{"from": 4}) == ""
+    assert browser.value("regrasp.state.from") == 4
+    assert typed(to=99) == f"There is no set 99: they are numbered from 0 to {len(numbers) - 1}."
+    assert browser.value("document.querySelector('#to').value") == "99"
+    assert browser.value("[regrasp.state.from, regrasp.state.to]") == [4, None]
+    assert "same" in typed(to=4)
+    assert typed(to=9) == ""
+    assert browser.value("[regrasp.state.from, regrasp.state.to]") == [4, 9]
+    assert "first" in typed(**{"from": ""})
+    # edges have numbers as the box says
+    browser.run("regrasp.select(null)")
+    count = "document.querySelectorAll('#picture .edge-number').length"
+    assert browser.value(count) == bracket_graph.polygon.n_edges
+    browser.click("#show-edges")
+    assert browser.value(count) == 0
+    # of more points than can be read the one that is pointed at
+    browser.open(chapter.to_html(), tmp_path)
+    assert len(chapter) > 60
+    assert browser.driver.execute_async_script(written) == []
+    canvas = browser.driver.find_element("css selector", "#canvas")
+    x, y = browser.value("regrasp.onMap(7)")
+    offset = round(x - canvas.rect["width"] / 2), round(y - canvas.rect["height"] / 2)
+    ActionChains(browser.driver).move_to_element_with_offset(canvas, *offset).perform()
+    edges = ", ".join(map(str, chapter.sets[7].edges))
+    browser.wait("regrasp.state.hovered === 7")
+    assert browser.driver.execute_async_script(written) == [f"set 7: edges {edges}"]
 
 
 @pytest.mark.parametrize("which", ["complete", "chapter", "three", "five", "limited"])
@@ -502,12 +613,15 @@ def test_a_graph_without_sets(browser, workpieces, tmp_path):
     assert browser.text("#facts").startswith("0 sets")
 
 
-def test_a_hand_that_limits_distances(browser, workpieces, tmp_path):
-    graph = rl.build_switching_graph(workpieces["l_bracket"], 0.3, rl.Hand(max_span=80.0))
+@pytest.mark.parametrize("limits", [{"max_span": 80.0}, {"only_place": [4]}])
+def test_a_hand_that_ties_fingers_to_each_other(browser, workpieces, limits, tmp_path):
+    graph = rl.build_switching_graph(workpieces["l_bracket"], 0.3, rl.Hand(**limits))
     browser.open(graph.to_html(), tmp_path)
     i = next(i for i in range(len(graph)) if graph.neighbors(i))
     j = graph.neighbors(i)[0]
-    browser.run(f"regrasp.select({i}, null); regrasp.select({i}, {j})")
+    browser.run(f"regrasp.select({i}, null)")
+    assert "limits that tie fingers to each other are not looked at" in browser.text("#now")
+    browser.run(f"regrasp.select({i}, {j})")
     switch = json.loads(browser.value(f"JSON.stringify(regrasp.switchOf({i}, {j}))"))
     assert switch["leaving"] == pytest.approx(graph.sets[i].witness.fractions.tolist())
     assert switch["held"] == graph.held(i, j)

@@ -25,6 +25,7 @@ from regrasp_lp.cli import _discard_output, main, values
 from regrasp_lp.cli.arguments import build_parser
 from regrasp_lp.cli.far_apart import chosen_grasp, far_apart
 from regrasp_lp.cli.progress import ProgressBar
+from regrasp_lp.cli.wording import _OPTIONS
 from regrasp_lp.planning.search import fewest_placements, placements_from
 
 COMMANDS = ("plan", "graph", "table", "show", "check")
@@ -370,31 +371,32 @@ def test_digits_are_kept_where_the_margin_needs_them() -> None:
             ["--start", "0:1,0:59,2:30", "--sets", "chapter", "--friction", "0.1"],
             "the start is in none of the 2",
         ),
-        (["--name", "wedge", "--friction", "0.1"], "no two grasp sets are joined"),
+        (["--name", "wedge", "--friction", "0.1"], "there is only one grasp set at this friction"),
     ],
 )
 def test_no_plan(run: Run, options: list[str], reason: str) -> None:
     code, out, err = run(*RECTANGLE, *options, "--json", "plan.json", "--plot", "plan.png")
-    assert code == 1
+    assert (code, out) == (1, "")
+    line, *explanation = err.splitlines()
+    assert line.startswith("regrasp-lp plan: no ")
+    assert reason in line
     # the full explanation, where start and goal are known
-    assert out.startswith("No plan: ") if "--goal" in [*RECTANGLE, *options] else out == ""
-    assert_one_line(err)
-    assert err.startswith("regrasp-lp plan: no ")
-    assert reason in err
+    assert [text[:9] for text in explanation[:1]] == ["No plan: "] * ("--goal" in options)
     assert not Path("plan.json").exists()
     assert not Path("plan.png").exists()
 
 
 def test_what_would_help_is_said(run: Run) -> None:
-    code, out, _ = run(*RECTANGLE, *TWO_GRASPS, "--fingers", "3")
-    assert code == 1
-    labels = [line[:10].rstrip() for line in out.splitlines()[2:] if line[0] != " "]
+    code, out, err = run(*RECTANGLE, *TWO_GRASPS, "--fingers", "3")
+    assert (code, out) == (1, "")
+    _, found = err.split("\n", 1)
+    labels = [line[:10].rstrip() for line in found.splitlines()[2:] if line[0] != " "]
     assert labels == ["start", "goal", "switch", "friction", "fingers"]
-    assert "with 4 there is a plan of 2 placements" in out
+    assert "with 4 there is a plan of 2 placements" in found
     polygon = next(p for p in rl.read_polygons("parts.geojson") if p.name == "rectangle")
     friction = RECTANGLE[RECTANGLE.index("--friction") + 1]
     start, goal = (values.grasp(TWO_GRASPS[i]) for i in (1, 3))
-    assert out == f"{rl.explain(polygon, start, goal, float(friction), rl.Hand(3))}\n"
+    assert found == f"{rl.explain(polygon, start, goal, float(friction), rl.Hand(3))}\n"
 
 
 def test_the_search_for_what_would_help_is_shown(run: Run, monkeypatch: pytest.MonkeyPatch) -> None:
@@ -403,10 +405,9 @@ def test_the_search_for_what_would_help_is_shown(run: Run, monkeypatch: pytest.M
     monkeypatch.setattr("regrasp_lp.cli.progress._REDRAW", 0.001)
     monkeypatch.setattr(ProgressBar, "__init__", lambda bar: original(bar, terminal, after=0.0))
     code, out, err = run(*RECTANGLE, *TWO_GRASPS, "--fingers", "3")
-    assert code == 1
-    assert_one_line(err)
+    assert (code, out) == (1, "")
     assert "times the friction" in terminal.getvalue()
-    assert "\r" not in out
+    assert "\r" not in err
 
 
 def test_no_grasp_at_all(run: Run, tmp_path: Path) -> None:
@@ -418,6 +419,101 @@ def test_no_grasp_at_all(run: Run, tmp_path: Path) -> None:
     graph = rl.build_switching_graph(rl.read_polygons("parts.geojson")[0], 0.1, min_margin=1000)
     with pytest.raises(rl.NoPlanFound, match="has no grasp set"):
         far_apart(graph)
+
+
+@pytest.mark.parametrize(
+    ("options", "others", "blamed"),
+    [
+        ("--max-span 5", {}, "--max-span 5"),
+        ("--max-span 5 --edge-clearance 2", {"edge_clearance": 2.0}, "--max-span 5"),
+        ("--max-span 4 --avoid-edges 3", {"reachable": {3: None}}, "--max-span 4"),
+        ("--max-span 30 --avoid-edges 0,1,2,3,4", {"max_span": 30}, "--avoid-edges"),
+    ],
+)
+def test_the_limit_of_a_hand_that_is_to_blame(
+    run: Run, options: str, others: dict[str, object], blamed: str
+) -> None:
+    """What a hand without this limit could do is counted by building its graph."""
+    plan = ["plan", "parts.geojson", "--name", "l_bracket", "--friction", "0.3"]
+    code, out, err = run(*plan, *options.split())
+    assert (code, out) == (1, "")
+    assert_one_line(err)
+    assert "l_bracket has no grasp set at this friction within the limits of the hand" in err
+    polygon = next(p for p in rl.read_polygons("parts.geojson") if p.name == "l_bracket")
+    sets = len(rl.build_switching_graph(polygon, 0.3, rl.Hand(**others)).sets)
+    assert sets > 0
+    assert err.endswith(f"there would be {sets} without {blamed}\n")
+
+
+def test_limits_of_a_hand_that_are_to_blame_together(run: Run) -> None:
+    plan = ["plan", "parts.geojson", "--name", "l_bracket", "--friction", "0.3"]
+    err = run(*plan, "--max-span", "5", "--avoid-edges", "0,1,2,3,4")[2]
+    assert re.search(r"there would be \d+ without all of these, none with one less\n$", err)
+
+
+def test_the_friction_that_joins_sets_is_said(run: Run) -> None:
+    err = run("plan", "parts.geojson", "--name", "wedge", "--friction", "0.05")[2]
+    found = re.search(r"two sets are joined from a friction of ([\d.]+), not yet at ([\d.]+);", err)
+    assert found
+    wedge = next(p for p in rl.read_polygons("parts.geojson") if p.name == "wedge")
+    joined = [rl.build_switching_graph(wedge, float(mu)).n_switches > 0 for mu in found.groups()]
+    assert joined == [True, False]
+
+
+@pytest.mark.parametrize(
+    ("fingers", "reason"),
+    [
+        ("1,2,3,4", "and there are no others: give a start"),
+        ("1,2,3", "with the others alone there is no grasp set: give a start"),
+        ("1,2", "with the others alone no two grasp sets are joined: give a start"),
+    ],
+)
+def test_fingers_that_only_slide_need_a_start(run: Run, fingers: str, reason: str) -> None:
+    code, out, err = run(*RECTANGLE, "--only-slide", fingers)
+    assert (code, out) == (1, "")
+    assert_one_line(err)
+    assert "fingers that only slide (--only-slide) hold from a given start on" in err
+    assert err.endswith(f"{reason}\n")
+
+
+def test_fingers_that_only_slide_from_a_given_start(run: Run) -> None:
+    options = [*RECTANGLE, *TWO_GRASPS[:2], "--only-slide"]
+    for fingers in ("1", "1,2", "1,2,3,4"):
+        code, out, err = run(*options, fingers)
+        assert (code, err) == (0, "")
+        assert "No goal given" in out
+        assert "release finger 1" not in out
+    code, out, err = run(*RECTANGLE, *TWO_GRASPS[2:], "--only-slide", "1,2,3,4")
+    assert (code, out) == (1, "")
+    assert err.endswith("and there are no others: give a start\n")
+
+
+def test_messages_name_options(run: Run, tmp_path: Path) -> None:
+    """Every option that a message may name is one of the command line."""
+    known = set(re.findall(r"--[a-z-]+", "".join(run(name, "--help")[1] for name in COMMANDS)))
+    assert set(_OPTIONS.values()) <= known
+    (tmp_path / "max_span.wkt").write_text("POINT (1 2)")
+    assert "error: max_span.wkt: " in run("show", "max_span.wkt")[2]
+    err = run(*RECTANGLE, "--start-xy", "30,1 30,30")[2]
+    assert err.endswith("(pass --tolerance to accept more)\n")
+    err = run(*RECTANGLE, *TWO_GRASPS, "--only-slide", "1")[2]
+    assert "finger 1 only slides (--only-slide): it stays on edge 0" in err
+    assert "without --only-slide there is a plan of 2 placements" in err
+    assert "only_slide" not in err
+
+
+def test_explanations_that_fail_do_not_hide_the_answer(
+    run: Run, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def fail(*_: object, **__: object) -> None:
+        raise rl.SolverError("the solver left it open (max_span=3)")
+
+    monkeypatch.setattr("regrasp_lp.why_not.explain", fail)
+    code, out, err = run(*RECTANGLE, *TWO_GRASPS, "--fingers", "3")
+    answer, more = err.splitlines()
+    assert (code, out) == (1, "")
+    assert "the start is in component 0" in answer
+    assert more.endswith("what would help is not known: the solver left it open (--max-span 3)")
 
 
 # --- errors: exit code 2, one line --------------------------------------------------------------
@@ -519,7 +615,17 @@ FOCUS = ["table", "parts.geojson", "--switching", "focus"]
         (["table", "parts.geojson", "-o", "no/t.csv"], "there is no folder 'no'"),
         (["check", "none.json"], "regrasp-lp check: error: none.json: cannot be read: No such"),
         (["check", "notes.txt"], "notes.txt is no JSON text"),
-        (["check", "parts.geojson"], "expected format 'regrasp-plan'"),
+        (
+            ["check", "parts.geojson"],
+            'parts.geojson: this is no plan, which has "format": "regrasp-plan", but GeoJSON',
+        ),
+        ([*RECTANGLE, "--only-place", "7"], "error: --only-place names fingers from 1 to 4, not 7"),
+        ([*RECTANGLE, "--max-span", "1", "--fingertip-separation", "2"], "--max-span 1 must be"),
+        (
+            [*RECTANGLE, *TWO_GRASPS, "--objective", "travel", "--alternatives", "2"],
+            "for 'travel': ask for --alternatives 1, or",
+        ),
+        ([*FOCUS, "--sets", "complete"], "use --sets chapter, or --switching contact"),
     ],
 )
 def test_errors(run: Run, tmp_path: Path, arguments: list[str], fragment: str) -> None:
@@ -700,8 +806,8 @@ def test_certificates_of_a_graph(run: Run) -> None:
 @pytest.mark.parametrize(
     ("options", "message"),
     [
-        (["--sets", "chapter", "--switching", "focus"], 'switching="contact"'),
-        (["--min-margin", "1"], "min_margin=0"),
+        (["--sets", "chapter", "--switching", "focus"], "are for --switching contact"),
+        (["--min-margin", "1"], "are for --min-margin 0"),
         (["--save", "nut.proof"], "cannot be written twice"),
     ],
 )
@@ -1082,8 +1188,8 @@ def test_module_runs(tmp_path: Path) -> None:
     assert "goal reached" in done.stdout
     done = in_process_of_its_own(*RECTANGLE, *TWO_GRASPS, "--fingers", "3", cwd=tmp_path)
     assert done.returncode == 1
-    assert done.stdout.startswith("No plan: ")
-    assert_one_line(done.stderr)
+    assert (done.stdout, done.stderr.count("\nNo plan: ")) == ("", 1)
+    assert done.stderr.startswith("regrasp-lp plan: no plan exists")
 
 
 def test_a_reader_that_is_gone_is_no_error(tmp_path: Path) -> None:

@@ -144,7 +144,16 @@ def test_aimed_draws_find_what_uniform_ones_do_not() -> None:
 
 
 def test_drawing_and_judging_share_nothing_with_torque_functions() -> None:
-    geometry = {"errors", "contact", "rings", "ring_checks", "polygon", "directions", "friction"}
+    geometry = {
+        "errors",
+        "display",
+        "contact",
+        "rings",
+        "ring_checks",
+        "polygon",
+        "directions",
+        "friction",
+    }
     geometry |= {"wrenches"}
     assert reached("random_grasps") <= geometry
 

@@ -65,6 +65,8 @@ def test_a_plan_shows_its_steps_account_and_page(plan: rl.Plan) -> None:
     assert shown.count("<svg") == 1
     assert "Regrasp of l_bracket" in shown
     assert re.search(r"<iframe[^>]* srcdoc=\"&lt;!doctype html", shown, re.IGNORECASE)
+    # the page runs its script, and can reach nothing of the notebook around it
+    assert re.search(r"<iframe[^>]* sandbox='allow-scripts' ", shown)
 
 
 def test_names_cannot_break_out_of_the_page() -> None:
@@ -221,6 +223,22 @@ def test_fingers_move_evenly_in_a_slide() -> None:
 def test_bad_options_of_animations(plan: rl.Plan, options: dict[str, object]) -> None:
     with pytest.raises(rl.OptionError, match="has to be a positive number"):
         plan.to_gif(**options)  # type: ignore[arg-type]
+
+
+@pytest.mark.parametrize("seconds", [0.001, 437, 1e9])
+def test_times_that_a_gif_cannot_say(plan: rl.Plan, seconds: float) -> None:
+    with pytest.raises(rl.OptionError, match=r"seconds has to be from 0\.01 to 436"):
+        plan.to_gif(seconds=seconds)
+
+
+@pytest.mark.parametrize("seconds", [0.01, 436])
+def test_times_that_a_gif_can_just_say(seconds: float) -> None:
+    block = rl.Polygon([(0, 0), (6, 0), (6, 3), (0, 3)])
+    grasp = [(0, 3.0), (2, 3.0)]
+    found = rl.plan_regrasp(block, grasp, grasp, friction=0.4)
+    data = found.to_gif(seconds=seconds, dpi=20)
+    with Image.open(io.BytesIO(data)) as image:
+        assert image.info["duration"] == pytest.approx(1500 * seconds, abs=10)
 
 
 def test_the_command_line_writes_an_animation(

@@ -45,8 +45,19 @@ def test_examples_run_and_print_what_the_page_says(
     for example, printed in snippets.run(page):
         assert snippets.alike(example.shown, printed), f"{example.code}\nprints\n{printed}"
     # pictures that the page shows and its examples draw are there under these names
-    for name in load(monkeypatch, "gallery").drawn_by(page):
+    for name, folder in load(monkeypatch, "gallery").drawn_by(page).items():
         assert (tmp_path / name).exists(), name
+        if name.endswith(".html"):
+            kept, new = (program_of(path / name) for path in (DOCS / folder, tmp_path))
+            assert kept == new, f"docs/{folder}/{name} is old: run python docs/gallery.py"
+
+
+def program_of(page: Path) -> list[str]:
+    """Styles and scripts of a page for a browser, without its data, whose last digits may vary."""
+    text = page.read_text(encoding="utf-8")
+    parts = re.findall(r"<(?:style|script)(?![^>]*json)[^>]*>(.*?)</(?:style|script)>", text, re.S)
+    assert len(parts) >= 2
+    return parts
 
 
 def test_what_is_printed_is_compared(monkeypatch: pytest.MonkeyPatch) -> None:

@@ -26,6 +26,8 @@ from regrasp_lp.lp import get_solver
 from regrasp_lp.nearest_switch import nearest_switch
 from regrasp_lp.planning.on_demand import matches
 from regrasp_lp.planning.reach import within_reach
+from regrasp_lp.planning.relaxations import relaxations
+from regrasp_lp.planning.stuck import stuck
 from regrasp_lp.remedies import Remedy, remedy, upwards
 from regrasp_lp.shadows import shadows
 from regrasp_lp.switches import SwitchesOnDemand
@@ -463,6 +465,88 @@ def test_distances_between_fingers_are_not_looked_at() -> None:
     found = graph.explain([(0, 2.0), (2, 2.0)], [(1, 1.0), (3, 1.0)])
     assert found.nearest is None
     assert "not looked for" in str(found)
+
+
+SQUEEZED = [(0, 2.0), (2, 2.0)]
+ACROSS = [(1, 1.0), (3, 1.0)]
+
+
+@pytest.mark.parametrize("fingers", [3, 4])
+@pytest.mark.parametrize("sliding", [[1], [2], [1, 2], [3], [1, 3], [1, 2, 3]])
+def test_fingers_that_only_slide_are_part_of_the_answer(
+    fingers: int, sliding: list[int], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """An explanation says that there is a plan iff one is found, with so many placements."""
+    for slow in ("friction_threshold", "_more_fingers"):
+        monkeypatch.setattr(f"regrasp_lp.why_not.{slow}", lambda *_: None)
+    hand = rl.Hand(fingers, only_slide=sliding)
+    graph = rl.build_switching_graph(rectangle(), 0.4, hand)
+    three = [(0, 1.0), (0, 3.0), (2, 2.0)]
+    for goal in (ACROSS, three, [(2, 1.9), (0, 1.9)], [(0, 2.0), (1, 1.0), (3, 1.0)]):
+        try:
+            placed = graph.plan(SQUEEZED, goal).placements
+        except rl.NoPlanFound as answer:
+            found = graph.explain(SQUEEZED, goal)
+            assert not found.plan_exists
+            assert "of 1 components" not in answer.explanation
+            assert "only_slide" in answer.explanation
+            assert answer.explanation == f"no plan exists: {found.standstill}"
+            less = found.without
+            assert less is not None
+            assert list(less) == ["only_slide"]
+            other = rl.build_switching_graph(rectangle(), 0.4, rl.Hand(fingers))
+            relieved = less["only_slide"]
+            try:
+                free = other.plan(SQUEEZED, goal).placements
+            except rl.NoPlanFound:
+                assert relieved is None
+            else:
+                assert relieved is not None
+                assert relieved.placements == free
+        else:
+            question = Regrasp(
+                rectangle(),
+                *(rectangle().resolve(g) for g in (SQUEEZED, goal)),
+                graph.friction,
+                hand,
+                graph.options,
+            )
+            way = route(question, graph)
+            assert way is not None
+            assert way.placements == placed
+
+
+def test_what_fingers_that_only_slide_rule_out() -> None:
+    def reason(goal: list[tuple[int, float]], *sliding: int) -> str | None:
+        return stuck(rl.Hand(4, only_slide=sliding), rl.Grasp(SQUEEZED), rl.Grasp(goal))
+
+    assert reason(ACROSS) is None
+    assert reason(ACROSS, 3, 4) is None
+    assert "finger 1 only slides (only_slide): it stays on edge 0" in str(reason(ACROSS, 1, 2))
+    assert "finger 2 only slides" in str(reason([(0, 1.0), (0, 2.0)], 1, 2))
+    both = [(0, 2.0), (1, 1.0), (3, 1.0)]
+    assert reason(both, 1) is None
+    assert "2 contacts to which no finger slides, and 1 finger may" in str(reason(both, 1, 3, 4))
+    assert "it stays on edge 2" in str(reason(both, 1, 2, 3, 4))
+    more = [(0, 2.0), (2, 2.0), (3, 1.0)]
+    assert "1 contact to which no finger slides, and no fingers" in str(reason(more, 1, 2, 3, 4))
+    hand = rl.Hand(4, only_slide=[1, 2, 3, 4])
+    with pytest.raises(rl.NoPlanFound, match="no fingers may be placed"):
+        rl.plan_regrasp(rectangle(), SQUEEZED, [(0, 1.0), (0, 3.0), (2, 2.0)], 0.4, hand)
+
+
+def test_limits_of_a_hand_that_keep_it_from_a_plan() -> None:
+    hand = rl.Hand(3, max_span=40, only_place=[1])
+    assert relaxations(hand) == {
+        "max_span=40": rl.Hand(3, only_place=[1]),
+        "only_place": rl.Hand(3, max_span=40),
+    }
+    assert relaxations(rl.Hand(5)) == {}
+    found = rl.explain(rectangle(), SQUEEZED, ACROSS, 0.4, hand)
+    assert found.without == {"max_span=40": None, "only_place": None}
+    text = " ".join(str(found).split())
+    assert "hand without max_span=40, or without only_place there is no plan either" in text
+    assert "\nhand" not in str(rl.explain(rectangle(), SQUEEZED, ACROSS, 0.4, rl.Hand(3)))
 
 
 def lengths_of(polygon: rl.Polygon) -> list[tuple[int, float]]:

@@ -296,4 +296,4 @@ def test_command_line(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> Non
     assert main([*graph, "--avoid-edges", "a"]) == 2
     assert "does not name edges" in capsys.readouterr().err
     assert main([*graph, "--max-span", "0"]) == 2
-    assert "max_span must be a finite length larger than 0" in capsys.readouterr().err
+    assert "--max-span must be a finite length larger than 0" in capsys.readouterr().err

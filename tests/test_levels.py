@@ -264,7 +264,7 @@ def test_common_contacts_are_all_ways_to_hold_contacts_of_equal_edges() -> None:
     everyone = np.arange(len(edges))
     for index in everyone.tolist():
         for held in range(1, int((edges[index] >= 0).sum()) + 1):
-            found = common_contacts(edges, index, everyone, held)
+            found = common_contacts(edges, edges[index], everyone, held)
             rows = zip(found.others, found.here.tolist(), found.there.tolist(), strict=True)
             got = sorted((int(o), tuple(here), tuple(there)) for o, here, there in rows)
             expected = sorted(
@@ -288,7 +288,7 @@ def test_what_is_reached_by_a_switch_is_what_programs_join(measure: str) -> None
         cut = Cut(rows, 0.3 * float(rows.best[index]), get_solver("clarabel"))
         part = cut.part(index)
         others = np.setdiff1d(np.arange(len(rows)), [index])
-        contacts = common_contacts(rows.edges, index, others, 1)
+        contacts = common_contacts(rows.edges, rows.edges[index], others, 1)
         found = reach(cut, index, 0, contacts)
         for row in rng.permutation(len(contacts.others))[:6].tolist():
             other = int(contacts.others[row])

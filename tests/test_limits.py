@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Mapping
 from fractions import Fraction
 from itertools import combinations, combinations_with_replacement, pairwise, product
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -468,6 +470,36 @@ def test_what_is_not_for_limited_hands(hand: rl.Hand, tmp_path: Path) -> None:
 def test_edges_that_do_not_exist() -> None:
     with pytest.raises(rl.HandError, match="names edge 6; bracket has edges 0 to 5"):
         rl.build_switching_graph(BRACKET, 0.3, rl.Hand(reachable={6: None}))
+    with pytest.raises(rl.HandError, match="^finger_reachable names edge 6; bracket has edges"):
+        rl.build_switching_graph(BRACKET, 0.3, rl.Hand(finger_reachable={1: {6: None}}))
+
+
+@pytest.mark.parametrize(
+    ("limits", "role", "message"),
+    [
+        (
+            {"reachable": {0: (0, 30)}, "finger_reachable": {1: {0: (0, 10)}}},
+            "start",
+            "finger 1 may not touch: from 0 to 10 on this edge (reachable and finger_reachable of",
+        ),
+        (
+            {"edge_clearance": 25, "finger_reachable": {1: {3: None}}},
+            "start",
+            "finger 1 may not touch: from 25 to 39 on this edge (edge_clearance=25 of",
+        ),
+        (
+            {"finger_reachable": {1: {0: (0, 8)}, 2: {0: (4, 12)}, 3: {0: None}, 4: {0: None}}},
+            "goal",
+            "the hand may not touch: from 0 to 12 on this edge (finger_reachable of",
+        ),
+    ],
+)
+def test_limits_that_forbid_a_contact_are_named(
+    limits: dict[str, Any], role: str, message: str
+) -> None:
+    grasp = BRACKET.resolve([(0, 20.0), (2, 6.0)])
+    with pytest.raises(rl.HandError, match=re.escape(message)):
+        within_reach(BRACKET, rl.Hand(**limits), grasp, role)
 
 
 # --- plans --------------------------------------------------------------------------------------

@@ -417,7 +417,8 @@ def test_what_cannot_be_sent_is_an_error(workers: WorkerProcesses, pool: Executo
     for executor in (workers, pool):
         for one in rl.build_switching_graphs(OBJECTS[:2], FRICTION, executor, apply=hidden):
             assert one.error is not None
-            assert "pickle" in str(one.error).lower()
+            # what Python says differs between its versions
+            assert re.search("pickle|local object", str(one.error))
 
 
 def test_all_our_errors_can_be_pickled() -> None:

@@ -77,7 +77,7 @@ def test_what_is_next_to_start_and_goal(measure: Measure) -> None:
         caps, promise = [], np.zeros((2, polygon.n_edges))
         for side, grasp in zip(promise, (start, goal), strict=True):
             best = 0.0
-            for support in supports(rows, graph.sets, grasp):
+            for support in supports(rows, graph.sets, grasp, 4):
                 best = max(best, support.widest)
                 for contacts in moves.of(support.index):
                     levels = support.onward(contacts).max(axis=(1, 2))

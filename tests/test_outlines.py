@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import itertools
 import math
+import re
 import subprocess
 import sys
 from collections.abc import Callable
@@ -139,8 +141,16 @@ def test_branches_and_crossings_are_named() -> None:
         outlines([piece(s, name=f"side {k}") for k, s in enumerate(sides)], Reading())
     shifted = [(x + 1, y) for x, y in square(1)]
     crossing = [piece(square(1), True, name="one"), piece(shifted, True, name="two")]
-    with pytest.raises(rl.PolygonError, match="one meets two near"):
+    with pytest.raises(rl.PolygonError, match="one meets two at"):
         outlines(crossing, Reading())
+    corner = [(x + 1.5, y + 1) for x, y in square(1)]
+    for first, other, turned in itertools.product((square(1), square(-1)), (corner,), (1, -1)):
+        rings = [piece(first, True, name="one"), piece(other[::turned], True, name="two")]
+        with pytest.raises(rl.PolygonError) as caught:
+            outlines(rings, Reading())
+        met = re.search(r"one meets two at \((\S+), (\S+)\):", str(caught.value))
+        assert met
+        assert tuple(map(float, met.groups())) in {(0.5, 1.0), (1.0, 0.0)}
     twice = [piece(square(1), True, name="one"), piece(square(1), True, name="two")]
     with pytest.raises(rl.PolygonError, match="one meets two"):
         outlines(twice, Reading())
@@ -246,13 +256,28 @@ def test_what_is_no_outline_is_named(dxf: Callable[..., Path]) -> None:
     path = dxf(draw)
     message = fault(path)
     assert message.startswith("TEXT (handle ")
-    assert "layer 'NOTES') is no outline (there are 2 POINT, 1 TEXT of such)" in message
+    assert "layer 'NOTES') is no outline (in all: 2 POINT, 1 TEXT): leave such" in message
     assert 'ignore=["POINT", "TEXT"]' in message
     both = rl.read_polygons(path, ignore=["point", "Text"])
     assert [polygon.name for polygon in both] == ["NOTES", "part_1"]
     assert len(rl.read_polygons(path, layers="notes", ignore="TEXT")) == 1
     assert "POINT" in fault(path, layers=["HIDDEN"])
     assert "no layer 'CUT'; the layers are '0'" in fault(path, layers=["CUT"])
+
+
+@pytest.mark.parametrize("version", ["R12", "R2010"])
+def test_layers_in_no_table_are_layers(dxf: Callable[..., Path], version: str) -> None:
+    def draw(space: Modelspace) -> None:
+        block = space.doc.blocks.new("B")
+        block.add_circle((9, 0), 2, {"layer": "Inner"})
+        space.add_blockref("B", (0, 0))
+        space.add_circle((0, 0), 1, {"layer": "Cut"})
+
+    path = dxf(draw, version)
+    assert all(name not in ezdxf.readfile(path).layers for name in ("Cut", "Inner"))
+    for layer, size in (("cut", math.pi), ("INNER", 4 * math.pi)):
+        assert areas(path, layers=[layer]) == pytest.approx([size], rel=1e-3)
+    assert "no layer 'cat'; the layers are '0', 'Cut', 'Inner'" in fault(path, layers=["cat"])
 
 
 def test_layer_0_of_blocks_is_that_of_the_insert(dxf: Callable[..., Path]) -> None:
@@ -348,6 +373,24 @@ def test_shapes_and_paths(
     assert [polygon.area for polygon in found] == pytest.approx(expected, abs=5e-3)
 
 
+@pytest.mark.parametrize(
+    ("content", "words"),
+    [
+        ('<path d="M10 5 h4 v3"/>', "it ends at (10, 5), 5 from (14, 8)"),
+        ('<path d="M0 5h1M0 5h2M0 5h3"/>', "3 ends meet at (0, 5)"),
+        ('<rect y="30" width="9" height="9"/><rect y="34" x="4" width="9" height="9"/>', "(9, 34)"),
+        ('<path d="M0 0L2 2 2 0 0 2z" transform="translate(0 40)"/>', "(0, 40) to (2, 42), cross"),
+    ],
+)
+def test_coordinates_in_messages_are_those_of_the_file(
+    svg: Callable[..., Path], content: str, words: str
+) -> None:
+    message = fault(svg(content))
+    assert words in message
+    assert message.endswith("(coordinates as in the file: y points down)")
+    assert "y points" not in fault(svg('<path d="M0 0h3z"/>'))
+
+
 def test_the_y_axis_is_turned_up_and_units_stay(svg: Callable[..., Path]) -> None:
     path = svg('<polygon id="a" points="1,2 5,2 1,7"/>', 'width="100mm" viewBox="0 0 10 10"')
     (polygon,) = rl.read_polygons(path)
@@ -407,7 +450,7 @@ def test_preserve_aspect_ratio_none_and_slice(svg: Callable[..., Path]) -> None:
         ('<path d="M0 0 L 1"/>', "cannot be read"),
         ('<path d="L 1 1"/>', "<path> (line 2): its path data 'L 1 1' cannot be read"),
         ('<path d="M0 0 X 1 1"/>', "cannot be read"),
-        ('<path d="M0 0 h4 v3"/>', "<path> (line 2) is open: it ends at (0, 0), 5 from (4, -3)"),
+        ('<path d="M0 0 h4 v3"/>', "<path> (line 2) is open: it ends at (0, 0), 5 from (4, 3)"),
         ('<rect width="1em" height="2"/>', "width='1em' is no length"),
         ('<rect width="nan" height="2"/>', "width='nan' is no length"),
         ('<polygon points="0 0 1"/>', "odd number of coordinates"),
@@ -474,7 +517,7 @@ def test_relative_path_data_are_the_absolute_ones(seed: int) -> None:
 def test_options_are_checked(svg: Callable[..., Path], tmp_path: Path) -> None:
     path = svg('<circle r="1"/>')
     for options, words in (
-        ({"flattening": 0}, "flattening has to be more than 0"),
+        ({"flattening": 0}, "flattening=0 would need edges without end"),
         ({"flattening": -1.0}, "flattening has to be a length"),
         ({"flattening": True}, "flattening has to be a length"),
         ({"joining": math.nan}, "joining has to be a length"),
@@ -484,7 +527,7 @@ def test_options_are_checked(svg: Callable[..., Path], tmp_path: Path) -> None:
             rl.read_polygons(path, **options)
     text = tmp_path / "p.wkt"
     text.write_text("POLYGON ((0 0, 4 0, 4 3, 0 0))")
-    assert "is no drawing: layers and ignore are for DXF and SVG" in fault(text, layers=["a"])
+    assert "is no drawing: layers=... and ignore=... are for DXF" in fault(text, layers=["a"])
     assert len(rl.read_polygons(text, flattening=0.1, joining=0)) == 1
 
 

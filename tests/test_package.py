@@ -37,7 +37,8 @@ quality.grasps  quality.stability  quality.hulls  quality.friction_needed  quali
 quality.wrenches  quality.focus  quality.regions  quality.metrics  quality.epsilon_bounds
 quality.best_grasps  quality.maps
 quality
-planning  planning.touching  planning.hand  planning.reach
+planning  planning.touching  planning.hand  planning.relaxations  planning.reach
+planning.stuck
 remedies  planning.steps  planning.objective
 shadows  switching  joins  contact_rule  couplings  handovers  focus_rule  switches
 planning.plan_document  planning.limit_checks  planning.verification  planning.along
@@ -63,14 +64,15 @@ workers  many
 membership  sampling  completeness
 colors  graph_layout
 viewer.page  viewer.plans  viewer.graphs  viewer
-plotting.palette  plotting.placement  plotting.frame  plotting.outline  plotting.grasps
+plotting.palette  plotting.placement  plotting.frame  plotting.sight  plotting.outline
+plotting.fingers  plotting.grasps
 plotting.sets  plotting.scene  plotting.focus_cells  plotting.focus_switch  plotting.parallel_sets
 plotting.friction_cones  plotting.quality
 plotting.regions  plotting.contact_space  plotting.normals  plotting.graph
 plotting.filmstrip  plotting.animation  plotting
 __init__
-cli.progress  cli.values  cli.hand_options  cli.object_options  cli.far_apart  cli.alternatives
-cli.tables  cli.arguments  cli.commands
+cli.progress  cli.values  cli.wording  cli.hand_options  cli.object_options
+cli.no_choice  cli.far_apart  cli.alternatives  cli.tables  cli.arguments  cli.commands
 cli
 __main__
 """

@@ -511,3 +511,9 @@ def test_a_hand_of_two_is_none() -> None:
 
 def test_plans_are_plans() -> None:
     assert isinstance(block_graph().plan(GOOD, GOOD), Plan)
+
+
+def test_a_switch_of_which_no_grasps_are_found_is_said(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("regrasp_lp.planning.set_path.handovers", lambda *_: [])
+    with pytest.raises(rl.SolverError, match=r"no grasps of the switch from set \d+ to set \d+"):
+        rl.plan_regrasp(rectangle(8, 3), [(0, 4.0), (2, 4.0)], [(1, 1.5), (3, 1.5)], 0.4)

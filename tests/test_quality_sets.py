@@ -3,11 +3,13 @@
 from __future__ import annotations
 
 from itertools import combinations_with_replacement, product
+from typing import Any
 
 import numpy as np
 import pytest
 from conftest import star_polygon
 from geometry import rectangle, unit_square
+from matplotlib.path import Path as MplPath
 from regrasps import PARTS, random_grasps
 from scipy.optimize import linprog
 
@@ -190,6 +192,9 @@ def test_wrong_arguments_of_largest_regions() -> None:
         quality.largest_regions(square, 0.5, widths="most")
     with pytest.raises(rl.OptionError, match="2 or 3 contacts"):
         quality.largest_regions(square, 0.5, edges=[1])
+    for edges in (5, "12"):
+        with pytest.raises(rl.OptionError, match="edges has to be a list of two or three edges"):
+            quality.largest_regions(square, 0.5, edges=edges)
     with pytest.raises(rl.ContactError):
         quality.largest_regions(square, 0.5, edges=[1, 9])
 
@@ -342,6 +347,10 @@ def test_epsilon_of_a_set_is_bounded(forces: str, ell: rl.SwitchingGraph) -> Non
     assert held.proved
 
 
+def places_of(grasp: rl.Grasp) -> dict[str, np.ndarray]:
+    return {"edges": grasp.edges[None], "fractions": grasp.fractions[None]}
+
+
 def test_metrics_by_name_function_or_of_ones_own(ell: rl.SwitchingGraph) -> None:
     grasp_set = ell.sets[0]
 
@@ -350,10 +359,19 @@ def test_metrics_by_name_function_or_of_ones_own(ell: rl.SwitchingGraph) -> None
 
     found = quality.best(grasp_set, near_the_start)
     assert found.metric == "near_the_start"
+    assert found.value == near_the_start(ell.polygon, friction=0.4, **places_of(found.grasp))[0]
+    for name in ("margin", "tolerance", "epsilon"):
+        near_the_start.__name__ = name
+        same = quality.best(grasp_set, near_the_start)
+        assert (same.value, same.bound) == (found.value, None)  # theirs, not ours of this name
     with pytest.raises(rl.OptionError, match='"margin", "tolerance"'):
         quality.best(grasp_set, "beauty")
     with pytest.raises(rl.OptionError, match="forces"):
         quality.best(grasp_set, "epsilon", forces="all")
+    with pytest.raises(rl.OptionError, match="margin has no option 'bogus': it has no options"):
+        quality.best(grasp_set, "margin", bogus=1)
+    with pytest.raises(rl.OptionError, match="its options are forces, torque_scale"):
+        quality.best(grasp_set, quality.epsilon, friction=0.3)
 
 
 # --- maps ---------------------------------------------------------------------------------------
@@ -411,8 +429,7 @@ def test_maps_are_frozen_and_drawn(ell: rl.SwitchingGraph, chapter: rl.Switching
         with pytest.raises(ValueError, match="read-only"):
             found.values[0, 0] = 1.0
         drawn = found.plot()
-        shown = drawn.mesh.get_array()
-        assert (np.ma.getmaskarray(shown) == ~found.within).all()
+        assert_coloured_where_it_is_sampled(found, drawn)
         row, column = found.best
         assert drawn.best.get_xydata().tolist() == [[found.x[column], found.y[row]]]
         assert found.metric.name in drawn.scale.ax.get_ylabel()
@@ -422,6 +439,45 @@ def test_maps_are_frozen_and_drawn(ell: rl.SwitchingGraph, chapter: rl.Switching
         assert box.max[0] <= width + 0.01
         assert box.max[1] <= height + 0.01
         assert drawn._repr_png_()[:4] == b"\x89PNG"
+
+
+def assert_coloured_where_it_is_sampled(found: quality.QualityMap, drawn: Any) -> None:
+    """Samples of the set in their colours; of a focus cell up to its boundary, and no farther."""
+    shown = drawn.mesh.get_array()
+    assert (shown[found.within] == found.values[found.within]).all()
+    if found.over == "contacts":
+        assert drawn.cell is None
+        assert (np.ma.getmaskarray(shown) == ~found.within).all()
+        return
+    assert not np.ma.getmaskarray(shown).any()
+    assert not found.within.all()
+    points = np.stack(np.meshgrid(found.x, found.y), axis=-1).reshape(-1, 2)
+    rings = drawn.cell.get_path().to_polygons()
+    cell = np.any([MplPath(ring).contains_points(points) for ring in rings], axis=0)
+    # samples on the boundary itself may be either
+    assert (cell != found.within.ravel()).mean() < 0.05
+    for artist in (drawn.mesh, drawn.levels):
+        path, transform = artist.get_clip_path().get_transformed_path_and_affine()
+        ends = drawn.cell.get_transform().transform_path(drawn.cell.get_path())
+        assert transform.transform_path(path).vertices == pytest.approx(ends.vertices)
+    edges = ", ".join(map(str, found.grasp_set.edges))
+    assert drawn.ax.get_title("left") == f"margin over the focus cell of edges {edges}"
+
+
+@pytest.mark.parametrize("value", [np.inf, -np.inf, np.nan])
+def test_metrics_that_are_not_finite(value: float, ell: rl.SwitchingGraph) -> None:
+    """The best is a grasp of the set still, and never one of which nothing is known."""
+
+    def beside(polygon, *, friction, edges, fractions):
+        return np.where(fractions[:, 0] < 0.5, value, fractions[:, 0])
+
+    grasp_set = ell.sets[0]
+    found = quality.best(grasp_set, beside)
+    assert found.grasp in grasp_set
+    row, column = quality.quality_map(grasp_set, beside, samples=9).best
+    best = quality.quality_map(grasp_set, beside, samples=9).grasp(row, column)
+    for grasp in (found.grasp, best):
+        assert (grasp.fractions[0] < 0.5) == (value == np.inf)
 
 
 def test_maps_of_a_section(ell: rl.SwitchingGraph) -> None:

@@ -355,6 +355,18 @@ def test_turning_scaling_and_torque_scale() -> None:
     assert np.allclose(volumes[0][closed], 4 * volumes[1][closed])
 
 
+@pytest.mark.parametrize("forces", FORCES)
+@pytest.mark.parametrize("factor", [1e-14, 1e-9, 1e9, 1e14])
+def test_volumes_do_not_care_how_torques_are_scaled(factor: float, forces: str) -> None:
+    polygon, mu = PARTS["nut"](), 0.4
+    given = {"friction": mu, "forces": forces, **batch(polygon, 3, 13, 200)}
+    here = quality.hull_volume(polygon, torque_scale=1.5, **given)
+    there = quality.hull_volume(polygon, torque_scale=1.5 * factor, **given)
+    closed = here > 0
+    assert closed.sum() > 20
+    assert np.allclose(there[closed] * factor, here[closed], rtol=1e-6, atol=0)
+
+
 @pytest.mark.parametrize("factor", [1e-90, 1e90])
 def test_no_size_of_an_object_is_too_small_or_too_large(factor: float) -> None:
     polygon, other = PARTS["ell"](), rl.Polygon(factor * PARTS["ell"]().vertices)

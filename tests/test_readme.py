@@ -9,6 +9,8 @@ from pathlib import Path
 import pytest
 from conftest import REPOSITORY
 
+from regrasp_lp.cli import main
+
 README = REPOSITORY / "README.md"
 PAGES = [README, *sorted((REPOSITORY / "docs").rglob("*.md"))]
 
@@ -24,6 +26,24 @@ def test_examples_run(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
         assert not example.shown or snippets.alike(example.shown, printed), printed
     assert len(ran) > 4
     assert sum(bool(example.shown) for example, _ in ran) >= 2
+
+
+def test_the_first_command_prints_what_the_readme_shows(
+    monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """Line after line, but for what ``...`` stands for."""
+    pytest.importorskip("matplotlib").use("Agg")
+    monkeypatch.syspath_prepend(REPOSITORY / "docs")
+    monkeypatch.chdir(REPOSITORY)
+    assert main(import_module("gallery").first_command()) == 0
+    printed = iter(capsys.readouterr().out.splitlines())
+    text = README.read_text(encoding="utf-8")
+    found = re.search(r"main-command -->\n```bash\n.*?```\n.*?```\n(.*?)```", text, re.DOTALL)
+    assert found is not None
+    shown = found[1].splitlines()
+    assert len(shown) > 8
+    for line in shown:
+        assert line == "..." or line in printed, line
 
 
 @pytest.mark.parametrize("path", PAGES, ids=lambda page: page.relative_to(REPOSITORY).as_posix())

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from dataclasses import replace
 from functools import cache
 from itertools import pairwise, product
@@ -666,6 +667,13 @@ def test_the_account_of_the_sensitivity() -> None:
         assert text.startswith(f"What limits the regrasp of {plan.polygon.name}")
         for number in range(len(plan.grasps)):
             assert any(line.split()[:1] == [str(number)] for line in text.splitlines())
+        _, table = text.split("back and ahead\n")
+        head, *rows = table.splitlines()
+        columns = [m.span() for m in re.finditer(r" *[^ ]+", head)][1:]
+        cells = [[row[a:b].strip() for a, b in columns] for row in rows]
+        # a value for each finger: what is empty looks like what is not known
+        assert all(all(row) for row in cells)
+        assert len(cells) == sum(len(region.fingers) for region in plan.regions())
 
 
 def test_regions_of_fingers_that_are_all_at_an_end() -> None:

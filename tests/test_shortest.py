@@ -51,10 +51,17 @@ def graph_of(name: str, fingers: int = 4, sets: str = "complete") -> rl.Switchin
 
 
 def terminals(graph: rl.SwitchingGraph, grasp: rl.Grasp, *, goal: bool) -> list[Terminal]:
-    found = []
+    """The sets that hold a grasp; of complete ones those that hold a part are a choice."""
+    found, size = [], graph.sets.cones.size
     for index, chosen in graph.sets.holding(graph.polygon.resolve(grasp)):
-        left = len(grasp) - len(chosen) if goal else 0
-        found.append(Terminal(index, grasp.fractions[list(chosen)], left))
+        left, most = len(grasp) - len(chosen), (np.inf, np.inf)
+        part = rl.Grasp([grasp.contacts[i] for i in chosen])
+        if left and graph.options.sets == "complete":
+            own = (rl.margin, rl.tolerance)
+            margin, tolerance = (float(f(graph.polygon, part, graph.friction)) for f in own)
+            most = margin / size, tolerance / size
+        fractions = grasp.fractions[list(chosen)]
+        found.append(Terminal(index, fractions, left if goal else 0, most))
     return found
 
 
@@ -270,6 +277,10 @@ def route_optimum(
     program = Sum([], [], {}, [], [])
     margin = program.column(FLOOR * size, max(caps[0], FLOOR * size))
     tolerance = program.column(0.0, caps[1])
+    for end in ends:
+        for column, most in zip((margin, tolerance), end.most, strict=True):
+            if np.isfinite(most):
+                program.row({column: 1.0}, most * size)
     program.cost[margin] = -weights.get("margin", 0.0)
     program.cost[tolerance] = -weights.get("tolerance", 0.0)
     before: list[int] = []
@@ -549,6 +560,23 @@ def test_plans_are_verified_and_no_other_plan_is_below_the_bound(
             if other.chosen_margin >= FLOOR * size:
                 assert found.bound <= price * other.placements + travel_of(other) + 1e-7 * size
     assert solved >= 2
+
+
+def test_no_row_of_a_set_may_be_as_good_as_is_asked_for() -> None:
+    graph = graph_of("ell")
+    found = None
+    for start, goal in pairs_of("ell", 8):
+        found = shortest(graph, start, goal, TRAVEL)
+        if found is not None and len(found.path) > 2:
+            break
+    assert found is not None
+    ends = (terminals(graph, start, goal=False), terminals(graph, goal, goal=True))
+    asked = np.array([0.0, 1e3])
+    most = 2 * asked
+    programs = RoutePrograms(graph.sets, *map(tuple, ends), np.array([1.0, 0, 1]), asked, most)
+    grasps = [grasp for nodes in found.grasps for grasp in (nodes[0], nodes[-1])]
+    assert any(not len(c.bounds) for i in found.path for c in programs.set_rows(i).choices)
+    assert programs.settled(found.route, grasps, np.inf) is None
 
 
 def test_more_programs_never_contradict_fewer() -> None:

@@ -455,7 +455,7 @@ def test_reading_a_file(tmp_path: Path) -> None:
         (b"\xff\xfe", "is no JSON text"),
         (b"[" * 100_000, "is no JSON text"),
         (b"[]", "plan.json: the document: expected an object"),
-        (b"{}", "found format None"),
+        (b"{}", 'has "format": "regrasp-plan", but other JSON'),
         (b'{"format": "regrasp-plan", "version": 3}', "version 3"),
         (b'{"format": "regrasp-plan", "version": 1}', "polygon is missing"),
     ],

@@ -1,7 +1,7 @@
 """The command line ``regrasp-lp``: plan, graph, table, show and check.
 
-Results go to standard output; errors, one line each, and the progress bar to standard error.
-Nothing else in the package prints.
+Results go to standard output. To standard error go errors, one line each, why there is no plan, a
+line and what would help, and the progress bar. Nothing else in the package prints.
 """
 
 from __future__ import annotations
@@ -9,10 +9,11 @@ from __future__ import annotations
 import io
 import os
 import sys
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 
 from regrasp_lp.cli.arguments import PROGRAM, UsageError, build_parser, read_command_line
-from regrasp_lp.cli.progress import complain
+from regrasp_lp.cli.progress import ProgressBar, complain, tell
+from regrasp_lp.cli.wording import in_options
 from regrasp_lp.errors import NoPlanFound, RegraspError
 
 __all__ = ["main"]
@@ -55,22 +56,40 @@ def main(arguments: Sequence[str] | None = None) -> int:
 
 def _run(arguments: Sequence[str]) -> int:
     program = PROGRAM
+    say: Callable[[str], str] = in_options
     try:
         options = read_command_line(build_parser(), arguments)
         program = f"{PROGRAM} {options.command}"
+        if options.command == "check":
+            say = str  # what files say is called as it is there
         # known only now: what a command needs is not loaded to print a help text
         code: int = options.run(options)
     except SystemExit as stop:  # argparse has printed a help text or the version
         return int(stop.code or 0)
     except NoPlanFound as answer:
-        return _fail(program, answer.explanation, 1)
+        return _refused(program, answer)
     except UsageError as error:
         return _fail(error.program, f"error: {error} (see {error.program} --help)", 2)
     except RegraspError as error:
-        return _fail(program, f"error: {error}", 2)
+        return _fail(program, f"error: {say(str(error))}", 2)
     except MemoryError:
         return _fail(program, "error: not enough memory; try an object with fewer edges", 2)
     return code
+
+
+def _refused(program: str, answer: NoPlanFound) -> int:
+    """Say why there is no plan; in full, with what would help, if start and goal are known."""
+    complain(program, in_options(answer.explanation))
+    if answer.question is None:
+        return 1
+    try:
+        with ProgressBar() as bar:
+            bar("looking for what would help", 0, 0)
+            explanation = answer.explain(bar)
+    except RegraspError as error:
+        return _fail(program, f"what would help is not known: {in_options(str(error))}", 1)
+    tell(in_options(str(explanation)))
+    return 1
 
 
 def _fail(program: str, message: str, code: int) -> int:

@@ -57,8 +57,8 @@ examples:
 
 exit codes:
   0  a plan was found; it has passed an exact check
-  1  there is no plan: standard error says why
-  2  an error"""
+  1  there is no plan: standard error says why, and what would help
+  2  an error: one line on standard error says what is wrong"""
 
 _GRAPH = """\
 Compute all grasp sets of an object and the switches between them, and print
@@ -344,14 +344,15 @@ def _add_grasps(parser: argparse.ArgumentParser) -> None:
             f"--{role}-xy",
             type=values.points,
             metavar="POINTS",
-            help="x,y pairs separated by spaces or semicolons",
+            help="x,y pairs separated by spaces or semicolons, near the boundary (--tolerance)",
         )
     group.add_argument(
         "--tolerance",
         type=values.length,
         metavar="LENGTH",
         help="how far points may be from the boundary, in the object's unit; they are moved to "
-        "its nearest place (default: a thousandth of the diagonal of the object's bounding box)",
+        "its nearest place (default: a thousandth of the diagonal of the object's bounding box; "
+        "Polygon.snap in Python takes 1e-6 only)",
     )
 
 

@@ -25,6 +25,7 @@ from regrasp_lp.cli.object_options import polygons_of
 from regrasp_lp.cli.progress import ProgressBar, complain
 from regrasp_lp.cli.tables import attempt, polygon_files, summaries_of
 from regrasp_lp.cli.values import ANIMATION, PICTURES, grasp_text
+from regrasp_lp.cli.wording import in_options
 from regrasp_lp.errors import (
     ContactError,
     FileFormatError,
@@ -36,6 +37,7 @@ from regrasp_lp.errors import (
 from regrasp_lp.files import write_atomically
 from regrasp_lp.friction import FloatArray, per_edge_friction
 from regrasp_lp.planning.requests import checked_grasp
+from regrasp_lp.refusals import in_no_set
 from regrasp_lp.switches import SwitchesOnDemand
 from regrasp_lp.tables import csv_table, markdown_table, text_table
 
@@ -60,11 +62,7 @@ def plan(options: Namespace) -> int:
         if asked is not None:
             asked = checked_grasp(polygon, asked, friction, hand, role)
         given[role] = asked
-    try:
-        found, *others = _found_plans(polygon, friction, hand, given, options)
-    except NoPlanFound as answer:
-        _print_explanation(answer)
-        raise
+    found, *others = _found_plans(polygon, friction, hand, given, options)
     print(found)
     print("It has passed an exact check.", flush=True)
     if options.alternatives > 1:
@@ -87,16 +85,6 @@ def plan(options: Namespace) -> int:
     return 0
 
 
-def _print_explanation(answer: NoPlanFound) -> None:
-    """Say in full why there is no plan, if start and goal are known."""
-    if answer.question is None:
-        return
-    with ProgressBar() as bar:
-        bar("looking for what would help", 0, 0)
-        explanation = answer.explain(bar)
-    print(explanation, flush=True)
-
-
 def _found_plans(
     polygon: Polygon,
     friction: FloatArray,
@@ -112,7 +100,7 @@ def _found_plans(
         with ProgressBar() as bar:
             built = _built(polygon, friction, hand, options, bar)
             bar("choosing grasps", 0, 0)
-            start, goal = _complete(built, given)
+            start, goal = _complete(built, given, bar)
         if None in given.values():
             print(_choice_text(given, {"start": start, "goal": goal}), end="\n\n", flush=True)
         on_demand = isinstance(built.switches, SwitchesOnDemand)
@@ -206,7 +194,7 @@ def _small_ones(polygons: list[Polygon], options: Namespace) -> list[Polygon]:
 
 def _complain(options: Namespace, failures: list[str]) -> None:
     for failure in failures:
-        complain(f"{PROGRAM} {options.command}", f"error: {failure}")
+        complain(f"{PROGRAM} {options.command}", f"error: {in_options(failure)}")
 
 
 def _table_format(options: Namespace) -> str:
@@ -337,18 +325,18 @@ def _asked_grasp(polygon: Polygon, role: str, options: Namespace) -> Grasp | Non
     try:
         return polygon.snap(points, tolerance)
     except ContactError as error:
-        raise ContactError(f"--{role}-xy: {error} (--tolerance changes it)") from error
+        raise ContactError(f"--{role}-xy: {error}") from error
 
 
-def _complete(graph: SwitchingGraph, given: dict[str, Grasp | None]) -> tuple[Grasp, Grasp]:
+def _complete(
+    graph: SwitchingGraph, given: dict[str, Grasp | None], bar: ProgressBar
+) -> tuple[Grasp, Grasp]:
     """Return start and goal; what is not given is chosen far from the other."""
     for role in _ROLES:
         one = given[role]
         if one is not None and None in given.values() and not graph.locate(one):
-            raise NoPlanFound(
-                f"no plan exists among these sets: the {role} is in none of the {len(graph)}"
-            )
-    return far_apart(graph, given["start"], given["goal"])
+            raise NoPlanFound(in_no_set(graph, role))
+    return far_apart(graph, given["start"], given["goal"], bar)
 
 
 def _choice_text(given: dict[str, Grasp | None], chosen: dict[str, Grasp]) -> str:

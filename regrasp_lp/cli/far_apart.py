@@ -6,22 +6,27 @@ from collections.abc import Iterable
 
 import numpy as np
 
+from regrasp_lp.cli.no_choice import no_choice
 from regrasp_lp.cli.values import grasp, grasp_text
 from regrasp_lp.contact import Grasp
-from regrasp_lp.errors import ContactError, NoPlanFound
+from regrasp_lp.errors import ContactError
 from regrasp_lp.friction import IntArray
 from regrasp_lp.planning.fingers import Fingers
 from regrasp_lp.planning.search import placements_from
 from regrasp_lp.quality import margin
 from regrasp_lp.switches import SwitchesOnDemand
-from regrasp_lp.switching_graph import SwitchingGraph
+from regrasp_lp.switching_graph import Progress, SwitchingGraph
 
+_NOTHING = Grasp([])
 _LOOK_AT = 300
 """Sets whose neighbours are looked at where switches are found on demand, for a second's work."""
 
 
 def far_apart(
-    graph: SwitchingGraph, start: Grasp | None = None, goal: Grasp | None = None
+    graph: SwitchingGraph,
+    start: Grasp | None = None,
+    goal: Grasp | None = None,
+    progress: Progress | None = None,
 ) -> tuple[Grasp, Grasp]:
     """Return a start and a goal between which a plan needs many placements.
 
@@ -35,6 +40,8 @@ def far_apart(
     graph : SwitchingGraph
     start, goal : Grasp, optional
         Checked grasps that are in the graph.
+    progress : callable, optional
+        Told what is done to find out why there are none.
 
     Returns
     -------
@@ -44,24 +51,23 @@ def far_apart(
     Raises
     ------
     NoPlanFound
-        If there are no two sets to choose from.
+        If there are no two sets to choose from; the message says why, and what would help.
     """
     if start is not None and goal is not None:
         return start, goal
     if start is not None:
-        return start, chosen_grasp(graph, _farthest(graph, graph.locate(start)))
+        sources = [index for index, _ in Fingers(graph.sets, graph.hand).starts(start)]
+        return start, chosen_grasp(graph, _farthest(graph, sources, start))
     if goal is not None:
         # The way back places as many fingers, but for those that the two ends differ by.
         fewer = graph.sets.contacts
-        return _held(graph, _farthest(graph, graph.locate(goal), fewer)), goal
+        return _held(graph, _farthest(graph, graph.locate(goal), fewer=fewer)), goal
     if not len(graph):
-        raise NoPlanFound("no plan exists: the object has no grasp set at this friction")
+        raise no_choice(graph, progress)
     first = _farthest(graph, [_beginning(graph)])
     second = _farthest(graph, [first])
     if first == second:
-        raise NoPlanFound(
-            "no two grasp sets are joined, so that none are far apart: give start and goal"
-        )
+        raise no_choice(graph, progress)
     return _held(graph, first), chosen_grasp(graph, second)
 
 
@@ -87,21 +93,31 @@ def _beginning(graph: SwitchingGraph) -> int:
     """Return a set from which to look for a far one."""
     if isinstance(graph.switches, SwitchesOnDemand):
         return int(graph.sets.margins.argmax())  # to find the components would take long
-    passable = Fingers(graph.sets, graph.hand).passable(Grasp([]))
+    passable = Fingers(graph.sets, graph.hand).passable(_NOTHING)
     first = graph.components()[0]
     return min(first if passable is None else first & set(np.flatnonzero(passable)) or first)
 
 
-def _farthest(graph: SwitchingGraph, sources: Iterable[int], fewer: IntArray | None = None) -> int:
-    """Return the set that needs most placements from the sources, less `fewer` of each set."""
+def _farthest(
+    graph: SwitchingGraph,
+    sources: Iterable[int],
+    start: Grasp = _NOTHING,
+    fewer: IntArray | None = None,
+) -> int:
+    """Return the set that needs most placements from the sources, less `fewer` of each set.
+
+    Fingers that only slide stay on the edges where they are at the start.
+    """
     sets = graph.sets
     most = _LOOK_AT if isinstance(graph.switches, SwitchesOnDemand) else None
-    passable = Fingers(sets, graph.hand).passable(Grasp([]))
+    passable = Fingers(sets, graph.hand).passable(start)
     margins = sets.margins if passable is None else np.where(passable, sets.margins, -np.inf)
     found = placements_from(
         sets.contacts, margins, graph.switches, graph.hand, dict.fromkeys(sources, 0), most
     )
-    reached = np.flatnonzero(found >= 0)
+    reached = np.flatnonzero((found >= 0) & (margins > -np.inf))
+    if not reached.size:
+        raise no_choice(graph)
     far = found[reached] if fewer is None else (found - fewer)[reached]
     margins = np.round(margins[reached] / graph.polygon.diameter, 6)
     return int(reached[np.lexsort((reached, -margins, -far))[0]])

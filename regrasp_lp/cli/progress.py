@@ -20,6 +20,12 @@ def complain(program: str, message: str) -> None:
         print(f"{program}: {' '.join(message.split())}", file=sys.stderr)
 
 
+def tell(text: object) -> None:
+    """Print a text of several lines to standard error, as it is."""
+    if sys.stderr is not None:
+        print(text, file=sys.stderr)
+
+
 class ProgressBar:
     """Shows on standard error what is being done, if that is a terminal.
 

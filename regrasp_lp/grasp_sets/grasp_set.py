@@ -51,6 +51,18 @@ class GraspSet(Pictured):
         that can be touched.
     limited : SetPieces, optional
         Its pieces, if the hand limits the distance between fingers.
+
+    Examples
+    --------
+    >>> import regrasp_lp as rl
+    >>> block = rl.Polygon([(0, 0), (6, 0), (6, 3), (0, 3)])
+    >>> pair = rl.build_switching_graph(block, friction=0.4).sets[0]
+    >>> pair
+    <GraspSet two_finger on edges (0, 2), margin 0.5571>
+    >>> rl.Grasp([(0, 2), (2, 4)]) in pair, rl.Grasp([(0, 1), (2, 1)]) in pair
+    (True, False)
+    >>> pair.pieces
+    <1 LinearSets over u0, u2: 2 rows · x + scales ε <= bounds>
     """
 
     polygon: Polygon

@@ -16,9 +16,23 @@ from typing import TypeAlias
 import numpy as np
 import numpy.typing as npt
 
-__all__ = ["Bezier", "Curve", "EllipticArc", "b_spline", "bulge", "polyline"]
+from regrasp_lp.errors import FileFormatError
+
+__all__ = [
+    "MOST_POINTS",
+    "Bezier",
+    "Curve",
+    "EllipticArc",
+    "b_spline",
+    "bulge",
+    "check_number",
+    "polyline",
+]
 
 _Floats: TypeAlias = npt.NDArray[np.float64]
+
+MOST_POINTS = 100_000
+"""Most points of a drawing: the tests of its rings compare all pairs of edges."""
 
 _WIDEST = math.pi / 2
 """Largest angle of an arc that one chord may stand for, however large the tolerance."""
@@ -68,11 +82,11 @@ class Bezier:
         degree = len(self.points) - 1
         if self.weights is not None and np.ptp(self.weights) > 0:
             homogeneous = np.column_stack([self.points * self.weights[:, None], self.weights])
-            parts = _halved(homogeneous, tolerance, _HALVINGS)
-            return np.concatenate([self.points[:1], *parts[:-1], self.points[-1:]])
+            inner = _halved(homogeneous, tolerance)[:-1]
+            return np.concatenate([self.points[:1], inner, self.points[-1:]])
         bend = np.diff(self.points, 2, axis=0)
         most = float(np.hypot(bend[:, 0], bend[:, 1]).max(initial=0.0))
-        n = max(1, math.ceil(math.sqrt(degree * (degree - 1) * most / (8 * tolerance))))
+        n = _parts(math.sqrt(degree * (degree - 1) * most / tolerance / 8), tolerance)
         level = np.broadcast_to(self.points, (n - 1, *self.points.shape))
         t = (np.arange(1, n) / n)[:, None, None]
         for _ in range(degree):
@@ -137,8 +151,8 @@ class EllipticArc:
         stretch = float(np.linalg.norm(np.stack([self.u, self.v]), ord=2))
         # half the angle from its sine: 1 - cos loses all digits where the tolerance is small
         ratio = min(tolerance / stretch, 1.0) if stretch > 0 else 1.0
-        widest = min(4 * math.asin(math.sqrt(ratio / 2)), _WIDEST)
-        n = max(1, math.ceil(abs(self.sweep) / widest * (1 - 1e-12)))
+        widest = max(min(4 * math.asin(math.sqrt(ratio / 2)), _WIDEST), 1e-150)
+        n = _parts(abs(self.sweep) / widest * (1 - 1e-12), tolerance)
         t = self.start + self.sweep * np.arange(n + 1) / n
         points: _Floats = self.center + np.outer(np.cos(t), self.u) + np.outer(np.sin(t), self.v)
         if self.ends is not None:
@@ -233,24 +247,61 @@ def _blossom(t: _Floats, controls: _Floats, k: int, arguments: list[float]) -> _
     return point
 
 
-def _halved(homogeneous: _Floats, tolerance: float, depth: int) -> list[_Floats]:
-    """Ends of the flat parts of a rational curve but for its start, arrays (1, 2)."""
-    points = homogeneous[:, :2] / homogeneous[:, 2:]
-    if depth == 0 or _off_chord(points) <= tolerance:
-        return [points[-1:]]
-    left, right, level = [homogeneous[0]], [homogeneous[-1]], homogeneous
-    while len(level) > 1:
-        level = (level[:-1] + level[1:]) / 2
-        left.append(level[0])
-        right.append(level[-1])
-    halves = (np.stack(left), np.stack(right[::-1]))
-    return [part for half in halves for part in _halved(half, tolerance, depth - 1)]
+def check_number(n: float, tolerance: float) -> None:
+    """Refuse a number of points that nothing could be done with.
+
+    Raises
+    ------
+    FileFormatError
+        If it is more than `MOST_POINTS`, or no number.
+    """
+    if not n <= MOST_POINTS:
+        raise FileFormatError(
+            f"has too many curves or points: more than {MOST_POINTS:,} edges would be needed to "
+            f"stay within {tolerance:.3g} of them; allow a larger distance (flattening=...), or "
+            "read a part of the drawing (layers=[...])"
+        )
 
 
-def _off_chord(points: _Floats) -> float:
-    """Largest distance of points from the segment between the first and the last of them."""
-    chord = points[-1] - points[0]
-    length = float(chord @ chord)
-    shares = np.clip((points - points[0]) @ chord / length, 0, 1) if length > 0 else 0.0
-    off = points - points[0] - np.multiply.outer(shares, chord)
-    return float(np.hypot(off[..., 0], off[..., 1]).max())
+def _parts(least: float, tolerance: float) -> int:
+    """How many parts a curve is cut into."""
+    check_number(least, tolerance)
+    return max(1, math.ceil(least))
+
+
+def _halved(homogeneous: _Floats, tolerance: float) -> _Floats:
+    """Ends of the flat parts of a rational curve but for its start, array (n, 2).
+
+    All parts that are not flat yet are halved at once; ends are sorted by the parameter at last.
+    """
+    parts, lasts = homogeneous[None], np.ones(1)
+    found, places, n = [], [], 0
+    for halving in range(_HALVINGS + 1):
+        points = parts[..., :2] / parts[..., 2:]
+        flat = (_off_chord(points) <= tolerance) | (halving == _HALVINGS)
+        found.append(points[flat, -1])
+        places.append(lasts[flat])
+        n += int(flat.sum())
+        check_number(n + len(parts) - int(flat.sum()), tolerance)
+        level = parts[~flat]
+        first, last = [level[:, 0]], [level[:, -1]]
+        while level.shape[1] > 1:
+            level = (level[:, :-1] + level[:, 1:]) / 2
+            first.append(level[:, 0])
+            last.append(level[:, -1])
+        ends = lasts[~flat]
+        parts = np.concatenate([np.stack(first, axis=1), np.stack(last[::-1], axis=1)])
+        lasts = np.concatenate([ends - 0.5 ** (halving + 1), ends])
+    return np.concatenate(found)[np.argsort(np.concatenate(places))]
+
+
+def _off_chord(points: _Floats) -> _Floats:
+    """Largest distance of points from the segment between the first and the last; (..., n, 2)."""
+    off = points - points[..., :1, :]
+    chord = off[..., -1:, :]
+    length = (chord * chord).sum(axis=-1)
+    along = (off * chord).sum(axis=-1)
+    shares = np.clip(np.divide(along, length, out=np.zeros_like(along), where=length > 0), 0, 1)
+    off = off - shares[..., None] * chord
+    largest: _Floats = np.hypot(off[..., 0], off[..., 1]).max(axis=-1)
+    return largest

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
+from fractions import Fraction
 from numbers import Real
 from typing import NamedTuple, TypeAlias
 
@@ -15,18 +16,25 @@ import numpy as np
 import numpy.typing as npt
 
 from regrasp_lp.errors import FileFormatError, OptionError, PolygonError
-from regrasp_lp.outlines.curves import Curve
-from regrasp_lp.ring_checks import check_rings, conflicts, nesting
+from regrasp_lp.outlines.curves import Curve, check_number
+from regrasp_lp.ring_checks import MAX_EXTENT, check_rings, first_conflict, nesting
 from regrasp_lp.rings import format_point
 
-__all__ = ["Outline", "Piece", "Reading", "outlines"]
+__all__ = ["Expansion", "Outline", "Piece", "Reading", "outlines"]
 
 _Floats: TypeAlias = npt.NDArray[np.float64]
+_Exact: TypeAlias = tuple[Fraction, ...]
 
 FLATTENING = 1e-3
 """Default distance between curves and their chords, in diagonals of the drawing."""
 JOINING = 1e-6
 """Default distance between ends that are joined, in diagonals of the drawing."""
+_NAMED = 8
+"""How many entities a message names at most."""
+
+
+MOST_PIECES = 100_000
+"""Entities of a drawing, those of blocks and uses as often as they are placed."""
 
 
 class Reading(NamedTuple):
@@ -57,7 +65,7 @@ class Reading(NamedTuple):
             if value is not None and not (a_number and 0 <= value < np.inf):
                 raise OptionError(f"{name} has to be a length, not {value!r}")
         if flattening == 0:
-            raise OptionError("flattening has to be more than 0: curves are no polygons")
+            raise OptionError("flattening=0 would need edges without end: give a small length")
         chosen = None if layers is None else _names("layers", layers)
         return cls(flattening, joining, chosen, _names("ignore", ignore))
 
@@ -95,6 +103,29 @@ class Piece:
     compound: int | None = None
 
 
+class Expansion:
+    """Counts what a drawing consists of: blocks within blocks can be without end."""
+
+    def __init__(self) -> None:
+        self._count = 0
+
+    def add(self, where: object, count: int = 1) -> None:
+        """Count one more entity, or several.
+
+        Raises
+        ------
+        FileFormatError
+            If there are more than `MOST_PIECES`.
+        """
+        self._count += count
+        if self._count > MOST_PIECES:
+            raise FileFormatError(
+                f"is a drawing of more than {MOST_PIECES:,} entities, those of repeated blocks "
+                f"counted as often as they are placed (this one is in {where}): draw the object "
+                "alone, or read a part of the drawing"
+            )
+
+
 class Outline(NamedTuple):
     """One polygon of a drawing: what messages call it, its name, and its rings."""
 
@@ -122,17 +153,34 @@ def outlines(pieces: Sequence[Piece], reading: Reading) -> list[Outline]:
     pieces = [piece for piece in pieces if piece.curves]
     if not pieces:
         return []
-    boxes = np.stack([curve.bounds for piece in pieces for curve in piece.curves])
+    boxes = np.stack([_box(piece) for piece in pieces])
     size = float(np.hypot(*(boxes[:, 2:].max(axis=0) - boxes[:, :2].min(axis=0))))
-    if not 0 < size < np.inf:
+    if size == 0:
         raise FileFormatError(f"the drawing is {size:g} in size: there is nothing to grasp")
     flattening = FLATTENING * size if reading.flattening is None else reading.flattening
     joining = JOINING * size if reading.joining is None else reading.joining
-    chains = [_chain(piece, flattening, joining) for piece in pieces]
-    loops = _joined([chain for chain in chains if chain is not None], joining)
+    chains: list[_Chain] = []
+    n = 0
+    for piece in pieces:
+        chain = _chain(piece, flattening, joining)
+        if chain is not None:
+            chains.append(chain)
+            n += len(chain.points)
+            check_number(n, flattening)
+    loops = _joined(chains, joining)
     _check(loops)
     inside = nesting([loop.points for loop in loops])
     return _nested(loops, inside)
+
+
+def _box(piece: Piece) -> _Floats:
+    """The box of a piece: (min x, min y, max x, max y)."""
+    boxes = np.stack([curve.bounds for curve in piece.curves])
+    if not (np.abs(boxes) <= MAX_EXTENT).all():
+        raise FileFormatError(
+            f"{piece.entity} has coordinates that are no numbers, or larger than {MAX_EXTENT:g}"
+        )
+    return np.concatenate([boxes[:, :2].min(axis=0), boxes[:, 2:].max(axis=0)])
 
 
 def _chain(piece: Piece, flattening: float, joining: float) -> _Chain | None:
@@ -140,9 +188,12 @@ def _chain(piece: Piece, flattening: float, joining: float) -> _Chain | None:
     parts = [curve.flattened(flattening) for curve in piece.curves]
     points = np.concatenate([parts[0][:1], *(part[1:] for part in parts)])
     kept = [0]
-    for k, point in enumerate(points):
-        if np.hypot(*(point - points[kept[-1]])) > joining:
-            kept.append(k)
+    if (np.hypot(*np.diff(points, axis=0).T) > joining).all():
+        kept = list(range(len(points)))
+    else:
+        for k, point in enumerate(points):
+            if np.hypot(*(point - points[kept[-1]])) > joining:
+                kept.append(k)
     if len(kept) == 1 and not piece.closed:
         return None
     if kept[-1] != len(points) - 1:  # the last point stays, and what is too near to it goes
@@ -187,34 +238,42 @@ def _joined(chains: Sequence[_Chain], joining: float) -> list[_Chain]:
 
 def _partners(ends: _Floats, pieces: Sequence[Piece], joining: float) -> list[int]:
     """The end that each end is joined to; ends 2k and 2k + 1 are those of piece k."""
+    distance, nearest = _nearest(ends, 3)  # an end itself, its partner, and one too many
+    branches = np.flatnonzero(distance[:, 2] <= joining)
+    if len(branches):
+        away = np.hypot(*(ends - ends[branches[0]]).T)
+        meeting = np.flatnonzero(away <= joining).tolist()
+        names = [pieces[k // 2].entity for k in meeting[:_NAMED]]
+        names += ["and more"] * (len(meeting) > _NAMED)
+        raise FileFormatError(
+            f"{len(meeting)} ends meet at {format_point(ends[branches[0]])}: {'; '.join(names)}: "
+            f"outlines do not branch (with joining={joining:.3g}, nearer ends are one point)"
+        )
+    alone = np.flatnonzero(distance[:, 1] > joining)
+    if len(alone):
+        raise _open_ends(alone, ends, pieces, joining)
+    partners: list[int] = (nearest[:, 0] + nearest[:, 1] - np.arange(len(ends))).tolist()
+    return partners
+
+
+def _nearest(points: _Floats, k: int) -> tuple[_Floats, npt.NDArray[np.intp]]:
+    """Distances to the k nearest of the points, itself among them, and which these are; (n, k)."""
     from scipy.spatial import cKDTree
 
-    near = [[e] for e in range(len(ends))]
-    for a, b in cKDTree(ends).query_pairs(joining, output_type="ndarray").tolist():
-        near[a].append(b)
-        near[b].append(a)
-    for e, found in enumerate(near):
-        if len(found) > 2:
-            names = "; ".join(pieces[k // 2].entity for k in found)
-            raise FileFormatError(
-                f"{len(found)} ends meet at {format_point(ends[e])}: {names}: outlines do not "
-                f"branch (ends nearer than joining={joining:.3g} are taken for one point)"
-            )
-    if alone := [e for e, found in enumerate(near) if len(found) == 1]:
-        raise _open_ends(alone, ends, pieces, joining)
-    return [found[0] + found[1] - e for e, found in enumerate(near)]
+    distances, found = cKDTree(points).query(points, k=k)
+    return np.asarray(distances, dtype=np.float64), np.asarray(found, dtype=np.intp)
 
 
 def _open_ends(
-    alone: list[int], ends: _Floats, pieces: Sequence[Piece], joining: float
+    alone: npt.NDArray[np.intp], ends: _Floats, pieces: Sequence[Piece], joining: float
 ) -> FileFormatError:
     """Name the two ends of the smallest gap."""
-    gaps = np.hypot(*(ends[alone][:, None] - ends[alone]).transpose(2, 0, 1))
-    np.fill_diagonal(gaps, np.inf)
-    first, second = sorted(alone[k] for k in divmod(int(gaps.argmin()), len(alone)))
+    gaps, nearest = _nearest(ends[alone], 2)
+    k = int(gaps[:, 1].argmin())
+    first, second = sorted(alone[nearest[k]].tolist())
     return FileFormatError(
         f"{pieces[first // 2].entity} is open: it ends at {format_point(ends[first])}, "
-        f"{gaps.min():.3g} from {format_point(ends[second])}, the nearest open end, of "
+        f"{gaps[k, 1]:.3g} from {format_point(ends[second])}, the nearest open end, of "
         f"{pieces[second // 2].entity}: close the outline, or join ends over larger gaps "
         f"(joining=...; it is {joining:.3g} now)"
     )
@@ -232,15 +291,38 @@ def _check(loops: Sequence[_Chain]) -> None:
                 "points; flatten its curves more finely, or leave it out"
             )
         check_rings([loop.points], loop.piece.entity)
-    pairs = conflicts([loop.points for loop in loops])
-    if pairs:
+    pair = first_conflict([loop.points for loop in loops])
+    if pair is not None:
         owner = np.repeat(np.arange(len(loops)), [len(loop.points) for loop in loops])
-        first, second = (loops[owner[i]].piece.entity for i in pairs[0])
+        first, second = (loops[owner[i]].piece.entity for i in pair)
         starts = np.concatenate([loop.points for loop in loops])
+        ends = np.concatenate([np.roll(loop.points, -1, axis=0) for loop in loops])
+        edges = [np.stack([starts[i], ends[i]]) for i in pair]
         raise PolygonError(
-            f"{first} meets {second} near {format_point(starts[pairs[0][0]])}: outlines and holes "
+            f"{first} meets {second} at {format_point(_common_point(*edges))}: outlines and holes "
             "may not touch or cross; draw each of them once, and unite what overlaps"
         )
+
+
+def _common_point(one: _Floats, other: _Floats) -> _Floats:
+    """A point of two edges that meet: an end that is on the other one, or where they cross.
+
+    Edges from a to b and from c to d, which cross, share a + (b − a) A / (A − B), where A and B are
+    the signed areas of the triangles c, d, a and c, d, b. Found exactly, then rounded.
+    """
+    (a, b), (c, d) = ends = [[tuple(map(Fraction, p)) for p in e.tolist()] for e in (one, other)]
+    for point, (p, q) in ((a, ends[1]), (b, ends[1]), (c, ends[0]), (d, ends[0])):
+        between = all(min(x, y) <= z <= max(x, y) for x, y, z in zip(p, q, point, strict=True))
+        if between and _turn(p, q, point) == 0:
+            return np.array(point, dtype=np.float64)
+    before, after = _turn(c, d, a), _turn(c, d, b)
+    share = before / (before - after)
+    return np.array([x + (y - x) * share for x, y in zip(a, b, strict=True)], dtype=np.float64)
+
+
+def _turn(p: _Exact, q: _Exact, r: _Exact) -> Fraction:
+    """(q − p) × (r − p)."""
+    return (q[0] - p[0]) * (r[1] - p[1]) - (q[1] - p[1]) * (r[0] - p[0])
 
 
 def _nested(loops: Sequence[_Chain], inside: npt.NDArray[np.bool_]) -> list[Outline]:

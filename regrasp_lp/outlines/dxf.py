@@ -6,9 +6,12 @@ Lines, polylines with bulges, arcs, circles, ellipses, splines and inserted bloc
 
 from __future__ import annotations
 
+import logging
 import math
+import struct
 from collections import Counter
 from collections.abc import Iterable, Iterator
+from contextlib import contextmanager
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, NamedTuple, TypeAlias
 
@@ -17,7 +20,7 @@ import numpy.typing as npt
 
 from regrasp_lp.errors import FileFormatError, MissingExtraError, OptionError
 from regrasp_lp.outlines.curves import Curve, EllipticArc, b_spline, bulge, polyline
-from regrasp_lp.outlines.drawing import Piece, Reading
+from regrasp_lp.outlines.drawing import Expansion, Piece, Reading
 
 if TYPE_CHECKING:
     from ezdxf.document import Drawing
@@ -34,6 +37,11 @@ _FLAT = 1e-9
 """Largest difference of heights and tilt of what lies in a plane, relative to its size."""
 _DEEPEST = 64
 """Blocks within blocks; more of them contain themselves."""
+_DAMAGE = (
+    *(ArithmeticError, AssertionError, AttributeError, LookupError, RuntimeError, TypeError),
+    *(ValueError, StopIteration, struct.error),
+)
+"""What ezdxf raises on damaged files, beside its own errors; it trusts what it reads."""
 
 
 def looks_like_dxf(data: bytes) -> bool:
@@ -69,11 +77,46 @@ def read_dxf(path: Path, reading: Reading) -> list[Piece]:
         from ezdxf.lldxf.const import DXFError
     except ModuleNotFoundError as error:
         raise MissingExtraError("ezdxf", "dxf", "reading DXF files") from error
+    with _quiet(), np.errstate(all="ignore"):  # what is not finite is refused by name later
+        try:
+            document = readfile(path)
+            space = document.modelspace()
+        except (DXFError, OSError, *_DAMAGE) as error:
+            raise FileFormatError(
+                f"is DXF that cannot be read: {_reason(error)} (a CAD program may mend it, and "
+                "save it anew)"
+            ) from error
+        try:
+            return _Walk(document, reading).pieces(space)
+        except DXFError as error:
+            raise FileFormatError(f"is DXF of damaged structure: {_reason(error)}") from error
+
+
+@contextmanager
+def _quiet() -> Iterator[None]:
+    """Let ezdxf's log go to nowhere but the handlers that somebody has set up."""
+    log, handler = logging.getLogger("ezdxf"), logging.NullHandler()
+    log.addHandler(handler)
     try:
-        document = readfile(path)
-    except (DXFError, ValueError, OSError) as error:
-        raise FileFormatError(f"is DXF that cannot be read: {error}") from error
-    return _Walk(document, reading).pieces()
+        yield
+    finally:
+        log.removeHandler(handler)
+
+
+@contextmanager
+def _named(where: str) -> Iterator[None]:
+    """Say of which entity ezdxf could make nothing."""
+    try:
+        yield
+    except (FileFormatError, OptionError, RecursionError):
+        raise
+    except _DAMAGE as error:
+        raise FileFormatError(f"{where} is damaged: {_reason(error)}") from error
+
+
+def _reason(error: Exception) -> str:
+    """What an error says, with its kind where that says more."""
+    return f"{error}" if " " in f"{error}" else f"{type(error).__name__} {error}".rstrip()
 
 
 class _Place(NamedTuple):
@@ -93,27 +136,30 @@ class _Walk:
         self._ignored = {kind.upper() for kind in reading.ignore}
         self._others: Counter[str] = Counter()
         self._first_other = ""
-        known = {str(layer.dxf.name).casefold() for layer in document.layers}
+        self._expansion = Expansion()
+        known = {} if reading.layers is None else _layers(document)
         for name in reading.layers or ():
             if name.casefold() not in known:
-                listed = ", ".join(repr(str(layer.dxf.name)) for layer in document.layers)
+                listed = ", ".join(map(repr, known.values()))
                 raise OptionError(f"there is no layer {name!r}; the layers are {listed}")
 
-    def pieces(self) -> list[Piece]:
-        found = list(self._walk(self._document.modelspace(), _Place(_IDENTITY, "0", ())))
+    def pieces(self, space: Iterable[Any]) -> list[Piece]:
+        found = list(self._walk(space, _Place(_IDENTITY, "0", ())))
         if self._others:
             listed = ", ".join(f"{n} {kind}" for kind, n in sorted(self._others.items()))
             kinds = ", ".join(f'"{kind}"' for kind in sorted(self._others))
             raise FileFormatError(
-                f"{self._first_other} is no outline (there are {listed} of such): leave them out "
+                f"{self._first_other} is no outline (in all: {listed}): leave such entities out "
                 f"with ignore=[{kinds}], or name the layers to read with layers=[...]"
             )
         return found
 
     def _walk(self, entities: Iterable[Any], place: _Place) -> Iterator[Piece]:
         for entity in entities:
-            layer = str(entity.dxf.layer)
+            with _named(f"{entity.dxftype()} (handle {entity.dxf.get('handle')})"):
+                layer = str(_common(entity, "layer", "0"))
             layer = place.layer if layer == "0" else layer
+            self._expansion.add(_words(entity, layer, place.trail))
             if entity.dxftype() == "INSERT":
                 yield from self._insert(entity, place._replace(layer=layer))
             elif self._wanted(entity, layer):
@@ -127,7 +173,7 @@ class _Walk:
             return False
         if self._layers is not None:
             return layer.casefold() in self._layers
-        if entity.dxf.get("invisible", 0):
+        if _common(entity, "invisible", 0):
             return False
         if layer not in self._document.layers:
             return True
@@ -137,8 +183,10 @@ class _Walk:
     def _insert(self, insert: Any, place: _Place) -> Iterator[Piece]:
         if "INSERT" in self._ignored:
             return
-        name, block = str(insert.dxf.name), insert.block()
         where = _words(insert, place.layer, place.trail)
+        with _named(where):
+            _require(insert, "name", "insert")
+            name, block = str(insert.dxf.name), insert.block()
         if block is None or block.block.is_xref:
             raise FileFormatError(f"{where} refers to block {name!r}, which is not in the file")
         if len(place.trail) >= _DEEPEST:
@@ -146,8 +194,10 @@ class _Walk:
         for attribute in insert.attribs:
             if self._wanted(attribute, place.layer):
                 self._note(attribute, place.layer, place.trail)
+        self._expansion.add(where, insert.mcount)
         for single in insert.multi_insert() if insert.mcount > 1 else [insert]:
-            matrix = _planar(single.matrix44(), where)
+            with _named(where):
+                matrix = _planar(single.matrix44(), where)
             inner = _Place(_after(place.matrix, matrix), place.layer, (*place.trail, name))
             yield from self._walk(block, inner)
 
@@ -161,12 +211,30 @@ class _Walk:
             self._note(entity, layer, place.trail)
             return None
         where = _words(entity, layer, place.trail)
-        curves, closed = _READERS[entity.dxftype()](entity, where)
-        turned = _after(place.matrix, _own_plane(entity, where))
+        with _named(where):
+            curves, closed = _READERS[entity.dxftype()](entity, where)
+            turned = _after(place.matrix, _own_plane(entity, where))
         if abs(float(np.linalg.det(turned[:, :2]))) == 0:
             raise FileFormatError(f"{where}: its block is inserted with a scale of 0")
         moved = tuple(curve.transformed(turned) for curve in curves)
         return Piece(where, None if layer == "0" else layer, moved, closed)
+
+
+def _common(entity: Any, name: str, default: Any) -> Any:
+    """What all entities may say, also those of a kind that ezdxf does not know."""
+    if entity.dxf.is_supported(name):
+        return entity.dxf.get(name, default)
+    return entity.graphic_properties().get(name, default)
+
+
+def _layers(document: Drawing) -> dict[str, str]:
+    """The layers of the table and those that entities are on: names, by the same in lower case.
+
+    Programs need not write a table; layers that are not in it have the standard properties.
+    """
+    listed = [str(layer.dxf.name) for layer in document.layers]
+    used = {str(e.dxf.layer) for e in document.entitydb.values() if e.dxf.hasattr("layer")}
+    return {name.casefold(): name for name in [*sorted(used), *listed]}
 
 
 def _words(entity: Any, layer: str, trail: tuple[str, ...]) -> str:
@@ -216,7 +284,15 @@ _Read: TypeAlias = tuple[list[Curve], bool]
 """Curves in the plane of the entity, and whether a segment closes them."""
 
 
+def _require(entity: Any, *names: str) -> None:
+    """Refuse an entity that does not say what ezdxf would put a standard value for."""
+    for name in names:
+        if not entity.dxf.hasattr(name):
+            raise ValueError(f"it has no {name.replace('_', ' ')}")
+
+
 def _line(entity: Any, where: str) -> _Read:
+    _require(entity, "start", "end")
     return polyline(_level([entity.dxf.start, entity.dxf.end], where)), False
 
 
@@ -244,7 +320,9 @@ def _bulged(points: _Floats, bulges: _Floats, closed: bool) -> _Read:
 
 def _circle(entity: Any, where: str) -> _Read:
     first, last = 0.0, 2 * math.pi
+    _require(entity, "center", "radius")
     if entity.dxftype() == "ARC":
+        _require(entity, "start_angle", "end_angle")
         first, last = math.radians(entity.dxf.start_angle), math.radians(entity.dxf.end_angle)
     radius = float(entity.dxf.radius)
     center = np.array(tuple(entity.dxf.center)[:2], dtype=np.float64)
@@ -253,6 +331,7 @@ def _circle(entity: Any, where: str) -> _Read:
 
 
 def _ellipse(entity: Any, where: str) -> _Read:
+    _require(entity, "center", "major_axis", "ratio")
     tool = entity.construction_tool()
     axes = _level([(0, 0, 0), tool.major_axis, tool.minor_axis], where)
     center = np.array(tuple(tool.center)[:2], dtype=np.float64)
@@ -262,6 +341,8 @@ def _ellipse(entity: Any, where: str) -> _Read:
 def _turn(center: _Floats, u: _Floats, v: _Floats, first: float, last: float) -> _Read:
     """An arc counter-clockwise in its plane; angles that are equal but for turns are a whole."""
     sweep = (last - first) % (2 * math.pi)
+    if not math.isfinite(sweep):
+        raise ValueError("its angles are no numbers")
     if min(sweep, 2 * math.pi - sweep) < 1e-9:
         sweep = 2 * math.pi
     if not (u.any() or v.any()):
@@ -270,13 +351,10 @@ def _turn(center: _Floats, u: _Floats, v: _Floats, first: float, last: float) ->
 
 
 def _spline(entity: Any, where: str) -> _Read:
-    try:
-        tool = entity.construction_tool()
-        controls = _level(tool.control_points, where)
-        weights = np.array(tool.weights(), dtype=np.float64)
-        knots = tool.knots()
-    except (ValueError, TypeError, ArithmeticError) as error:
-        raise FileFormatError(f"{where} is no spline: {error}") from error
+    tool = entity.construction_tool()
+    controls = _level(tool.control_points, where)
+    weights = np.array(tool.weights(), dtype=np.float64)
+    knots = tool.knots()
     if len(weights) and not (weights > 0).all():
         raise FileFormatError(f"{where} has weights that are not positive")
     rational = weights if len(weights) and np.ptp(weights) > 0 else None

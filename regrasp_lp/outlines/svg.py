@@ -16,8 +16,8 @@ import numpy as np
 import numpy.typing as npt
 
 from regrasp_lp.errors import FileFormatError, MissingExtraError, OptionError
-from regrasp_lp.outlines.drawing import Piece, Reading
-from regrasp_lp.outlines.svg_elements import Element, parse_elements
+from regrasp_lp.outlines.drawing import Expansion, Piece, Reading
+from regrasp_lp.outlines.svg_elements import Element, parse_elements, short
 from regrasp_lp.outlines.svg_shapes import SHAPES, Viewport, numbers_in
 
 __all__ = ["read_svg"]
@@ -33,12 +33,11 @@ _NOT_DRAWN = (
 _GROUPS = ("g", "a", "switch", "svg")
 _DEEPEST = 64
 """Uses within uses; more of them contain themselves."""
-_UPSIDE_DOWN = np.array([[1.0, 0.0, 0.0], [0.0, -1.0, 0.0]])
-"""The y axis of SVG points down, that of polygons up."""
+_IDENTITY = np.array([[1.0, 0.0, 0.0], [0.0, 1.0, 0.0]])
 
 
 def read_svg(data: bytes, reading: Reading) -> list[Piece]:
-    """Return the pieces of outlines that an SVG file draws.
+    """Return the pieces of outlines that an SVG file draws; as there, the y axis points down.
 
     Raises
     ------
@@ -53,7 +52,8 @@ def read_svg(data: bytes, reading: Reading) -> list[Piece]:
         import svgpathtools  # noqa: F401  (only to say what is missing before any work)
     except ModuleNotFoundError as error:
         raise MissingExtraError("svgpathtools", "svg", "reading SVG files") from error
-    return _Walk(parse_elements(data), reading).pieces()
+    with np.errstate(all="ignore"):  # what is not finite is refused with its name later
+        return _Walk(parse_elements(data), reading).pieces()
 
 
 @dataclass(frozen=True)
@@ -78,6 +78,7 @@ class _Walk:
         self._by_id = {e.attributes["id"]: e for e in reversed(elements) if "id" in e.attributes}
         self._ignored = {kind.casefold() for kind in reading.ignore}
         self._others: list[Element] = []
+        self._expansion = Expansion()
         self._compounds = 0
         self._layers = {
             name for e in elements if e.tag in _GROUPS for name in _names(e) if e is not root
@@ -104,11 +105,11 @@ class _Walk:
         elif "width" in root.attributes and "height" in root.attributes:
             whole = Viewport(*(root.length(name, None) for name in ("width", "height")))
         wanted = self._reading.layers is None
-        found = list(self._inside(root, self._inherited(root, _State(_UPSIDE_DOWN, whole, wanted))))
+        found = list(self._inside(root, self._inherited(root, _State(_IDENTITY, whole, wanted))))
         if self._others:
             kinds = sorted({element.tag for element in self._others})
             raise FileFormatError(
-                f"{self._others[0]} is no outline: leave such out with "
+                f"{self._others[0]} is no outline: leave such elements out with "
                 f"ignore=[{', '.join(repr(kind) for kind in kinds)}], turn them into paths, or "
                 "name the groups to read with layers=[...]"
             )
@@ -139,6 +140,7 @@ class _Walk:
         )
 
     def _walk(self, element: Element, state: _State) -> Iterator[Piece]:
+        self._expansion.add(element)
         tag = element.tag
         if not tag or tag in _NOT_DRAWN or tag.casefold() in self._ignored:
             return
@@ -224,7 +226,7 @@ def _view_box(element: Element) -> tuple[float, ...] | None:
         return None
     numbers = tuple(numbers_in(text, element, "viewBox"))
     if len(numbers) != 4 or not (numbers[2] > 0 and numbers[3] > 0):
-        raise FileFormatError(f"{element}: viewBox={text!r} is not x y width height")
+        raise FileFormatError(f"{element}: viewBox={short(text)} is not x y width height")
     return numbers
 
 
@@ -253,7 +255,9 @@ def _in_view(element: Element, sized: Element, state: _State) -> _State:
         share = {"Min": 0.0, "Mid": 0.5, "Max": 1.0}
         match = re.fullmatch(r"x(Min|Mid|Max)Y(Min|Mid|Max)", words[0])
         if match is None:
-            raise FileFormatError(f"{element}: preserveAspectRatio={' '.join(words)!r} is unknown")
+            raise FileFormatError(
+                f"{element}: preserveAspectRatio={short(' '.join(words))} is unknown"
+            )
         slack = (
             (w - scales[0] * box[2]) * share[match[1]],
             (h - scales[1] * box[3]) * share[match[2]],

@@ -10,14 +10,16 @@ from xml.parsers import expat
 
 from regrasp_lp.errors import FileFormatError
 
-__all__ = ["Element", "looks_like_svg", "parse_elements"]
+__all__ = ["Element", "looks_like_svg", "parse_elements", "short"]
 
 _NAMESPACE = "http://www.w3.org/2000/svg"
 _XLINK = "http://www.w3.org/1999/xlink"
 _INKSCAPE = "http://www.inkscape.org/namespaces/inkscape"
-_LENGTH = re.compile(r"\s*([+-]?(?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d+)?)\s*(%|[a-zA-Z]*)\s*")
+_LENGTH = re.compile(r"([+-]?(?:\d+(?:\.\d*)?|\.\d+)(?:[eE][+-]?\d+)?)\s*(%|[a-zA-Z]*)")
 _UNITS = {"": 1, "px": 1, "pt": 4 / 3, "pc": 16, "in": 96, "cm": 96 / 2.54, "mm": 96 / 25.4}
 """CSS units in user units; there are 96 to the inch."""
+_LONGEST_ENTITY = 200
+"""Entities that stand for more characters, or for other entities, can blow up a small file."""
 _STYLED = ("display", "visibility", "fill", "fill-rule", "clip-path", "mask", "transform", "d")
 
 
@@ -32,7 +34,7 @@ class Element:
     line: int
     attributes: dict[str, str]
     children: list[Element] = field(default_factory=list)
-    text: str = ""
+    words: list[str] = field(default_factory=list)
 
     def __str__(self) -> str:
         name = f"id {self.name!r}, " if self.name else ""
@@ -42,6 +44,11 @@ class Element:
     def name(self) -> str | None:
         """What the drawing calls the element: its label in Inkscape, or its id."""
         return self.attributes.get("label") or self.attributes.get("id") or None
+
+    @property
+    def text(self) -> str:
+        """What is written in the element itself."""
+        return "".join(self.words)
 
     @property
     def reference(self) -> str | None:
@@ -58,20 +65,27 @@ class Element:
             If it is no length, or in a unit that depends on fonts or windows.
         """
         text = self.attributes.get(name, default)
-        match = _LENGTH.fullmatch(text)
+        match = _LENGTH.fullmatch(text.strip())
         if match is not None and math.isfinite(float(match[1])):
             number, unit = float(match[1]), match[2]
             if unit in _UNITS:
                 return number * _UNITS[unit]
             if unit == "%" and whole is not None:
                 return number / 100 * whole
-        raise FileFormatError(f"{self}: {name}={text!r} is no length in px, pt, pc, in, cm or mm")
+        raise FileFormatError(
+            f"{self}: {name}={short(text)} is no length in px, pt, pc, in, cm or mm"
+        )
 
     def everything(self) -> Iterator[Element]:
         """Yield the element and all that is in it."""
         yield self
         for child in self.children:
             yield from child.everything()
+
+
+def short(text: str) -> str:
+    """Quote a text in a message, the beginning of a long one."""
+    return repr(text if len(text) <= 40 else text[:37] + "...")
 
 
 def looks_like_svg(data: bytes) -> bool:
@@ -98,6 +112,7 @@ def parse_elements(data: bytes) -> Element:
         If it is no well-formed XML, or its root is no SVG element.
     """
     parser = expat.ParserCreate(namespace_separator=" ")
+    parser.buffer_text = True
     top = Element("", 0, {})
     stack = [top]
 
@@ -110,11 +125,20 @@ def parse_elements(data: bytes) -> Element:
         stack.append(element)
 
     def text(characters: str) -> None:
-        stack[-1].text += characters
+        stack[-1].words.append(characters)
+
+    def entity(name: str, parameter: bool, value: str | None, *_: object) -> None:
+        # Illustrator declares short names of namespaces, which do no harm
+        if parameter or value is None or "&" in value or len(value) > _LONGEST_ENTITY:
+            raise FileFormatError(
+                f"declares the entity {short(name)} in line {parser.CurrentLineNumber}, which is "
+                "long, refers to others or is not in the file: save it as plain SVG"
+            )
 
     parser.StartElementHandler = start
     parser.EndElementHandler = lambda _: stack.pop()
     parser.CharacterDataHandler = text
+    parser.EntityDeclHandler = entity
     try:
         parser.Parse(data, True)
     except expat.ExpatError as error:

@@ -14,13 +14,17 @@ import numpy.typing as npt
 
 from regrasp_lp.errors import FileFormatError
 from regrasp_lp.outlines.curves import Bezier, Curve, EllipticArc, polyline
-from regrasp_lp.outlines.svg_elements import Element
+from regrasp_lp.outlines.svg_elements import Element, short
 
 __all__ = ["SHAPES", "Viewport", "elliptic_arc", "numbers_in"]
 
 _Floats: TypeAlias = npt.NDArray[np.float64]
 
 _NUMBER = r"[+-]?(?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d+)?"
+
+
+_THINNEST = 1e-100
+"""Least radius of an arc, relative to its chord: with less, lengths run out of range."""
 
 
 class Viewport(NamedTuple):
@@ -39,13 +43,10 @@ class Viewport(NamedTuple):
 
 def numbers_in(text: str, element: Element, name: str) -> list[float]:
     """Numbers separated by white space and commas."""
-    if not re.fullmatch(rf"[\s,]*(?:{_NUMBER}[\s,]*)*", text):
-        raise FileFormatError(f"{element}: {name}={_short(text)} is no list of numbers")
-    return [float(number) for number in re.findall(_NUMBER, text)]
-
-
-def _short(text: str) -> str:
-    return repr(text if len(text) <= 40 else text[:37] + "...")
+    found = [float(number) for number in re.findall(_NUMBER, text)]
+    if re.sub(_NUMBER, "", text).strip(" \t\r\n\f\v,") or not all(map(math.isfinite, found)):
+        raise FileFormatError(f"{element}: {name}={short(text)} is no list of numbers")
+    return found
 
 
 _Read: TypeAlias = Iterator[tuple[list[Curve], bool]]
@@ -122,7 +123,7 @@ def _path(element: Element, view: Viewport) -> _Read:
         "M",
         "m",
     ):
-        raise FileFormatError(f"{element}: its path data {_short(data)} cannot be read")
+        raise FileFormatError(f"{element}: its path data {short(data)} cannot be read")
     start = 0j
     for move, rest, close in re.findall(r"([Mm]?)([^MmZz]*)([Zz]?)", data):
         if not (move or rest.strip(" \t\r\n,")):
@@ -133,12 +134,12 @@ def _path(element: Element, view: Viewport) -> _Read:
             with warnings.catch_warnings():
                 warnings.simplefilter("ignore")  # arcs of no radius are segments, as SVG says
                 segments = list(parse_path(piece, current_pos=start))
+            curves = [_segment(segment) for segment in segments[:-1]]
         except (ValueError, IndexError, AssertionError, ArithmeticError) as error:
             reason = str(error) or "an arc ends where it starts"
             raise FileFormatError(
-                f"{element}: its path data {_short(move + rest + close)} cannot be read: {reason}"
+                f"{element}: its path data {short(move + rest + close)} cannot be read: {reason}"
             ) from error
-        curves = [_segment(segment) for segment in segments[:-1]]
         start = segments[0].start if close else segments[-1].end
         if curves:
             yield curves, bool(close)
@@ -148,6 +149,10 @@ def _segment(segment: Any) -> Curve:
     """A segment of svgpathtools, whose points are complex numbers."""
     if hasattr(segment, "bpoints"):
         return Bezier(np.array([(p.real, p.imag) for p in segment.bpoints()]))
+    across = abs(segment.end - segment.start)
+    radii = segment.radius.real, segment.radius.imag
+    if not (min(radii) > _THINNEST * across and cmath.isfinite(segment.radius)):
+        raise ValueError("the radii of an arc are too small for the distance of its ends")
     return elliptic_arc(
         segment.start,
         segment.radius,

@@ -38,15 +38,31 @@ def account(plan: Plan) -> str:
     str
     """
     name = plan.polygon.name or "unnamed polygon"
-    head = [
+    title = (
         f"Regrasp of {name}: {_count(len(plan.steps), 'step')}, "
-        f"{_count(plan.placements, 'placement')}, {plan.hand.fingers} fingers",
+        f"{_count(plan.placements, 'placement')}, {plan.hand.fingers} fingers"
+    )
+    return "\n".join([title, *head(plan), "", *_table(plan), "", *end(plan)])
+
+
+def head(plan: Plan) -> list[str]:
+    """Return what a plan amounts to, in lines: those of its account after the first one."""
+    return [
         f"least margin {plan.margin:.4g}, least tolerance {plan.tolerance:.4g}",
         *_chosen(plan),
         *_objective(plan),
         *_warning(plan),
-        "",
     ]
+
+
+def end(plan: Plan) -> list[str]:
+    """Return what limits a plan, and its goal, in lines: the last ones of its account."""
+    goal = ", ".join(_at(contact) for contact in plan.goal)
+    return [*_limits(plan), f"goal reached: {goal}"]
+
+
+def _table(plan: Plan) -> list[str]:
+    """A line for each step, or more where its words are long."""
     texts = ["start: " + ", ".join(f"{k} on {_at(c)}" for k, c in plan.start.items())]
     texts += [describe(step) for step in plan.steps]
     lines = [_row("", "step", "held by", "margin", "tolerance", "on the way")]
@@ -58,8 +74,7 @@ def account(plan: Plan) -> str:
         sizes = f"{grasp.margin:.4g}", f"{grasp.tolerance:.4g}"
         lines.append(_row(str(i), first, fingers, *sizes, way))
         lines += [_row("", line) for line in rest]
-    goal = ", ".join(_at(contact) for contact in plan.goal)
-    return "\n".join([*head, *lines, "", *_limits(plan), f"goal reached: {goal}"])
+    return lines
 
 
 def _chosen(plan: Plan) -> list[str]:

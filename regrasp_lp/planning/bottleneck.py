@@ -349,12 +349,9 @@ def gates(
         Whether these are goals, and the ways are gone backwards.
     """
     for support in supports:
-        after = support.others if arriving else 0
-        if support.limit < cut.least:
-            continue
         inside = support.inside(cut.least)
         if inside:
-            yield _Gate(support, support.index, np.array(inside), after)
+            yield _Gate(support, support.index, np.array(inside), 0)
             continue
         part = cut.part(support.index)
         seen: set[int] = set()
@@ -363,20 +360,20 @@ def gates(
             if place >= 0 and int(part.labels[place]) not in seen:
                 seen.add(int(part.labels[place]))
                 pieces = np.array([landing.piece])
-                yield _Gate(support, support.index, pieces, after, visible=landing.visible)
+                yield _Gate(support, support.index, pieces, 0, visible=landing.visible)
             if len(seen) == part.count:
                 break
-        for contacts in moves.of(support.index):
+        for contacts in support.ways(moves):
             found = _given(cut, contacts, support)
             for row in np.flatnonzero(found.any(axis=(1, 2))).tolist():
                 other = int(contacts.others[row])
-                size = int((cut.rows.edges[support.index if arriving else other] >= 0).sum())
+                size = len(support.edges) if arriving else int(cut.rows.contacts[other])
                 here, there = contacts.here[row].tolist(), contacts.there[row].tolist()
                 slots: Slots = tuple(
                     zip(there, here, strict=True) if arriving else zip(here, there, strict=True)
                 )
                 # Their parts are asked for when a search gets there: most never are.
-                pieces, cost = np.argwhere(found[row]), size - contacts.held + after
+                pieces, cost = np.argwhere(found[row]), size - contacts.held
                 yield _Gate(support, other, pieces, cost, slots=slots)
 
 

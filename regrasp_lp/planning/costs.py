@@ -40,7 +40,8 @@ class Shortest:
     travel : float
         In the object's unit, as margin and tolerance.
     margin, tolerance : float
-        The least of the grasps that were free to choose, bends included; inf if none was.
+        The least of the grasps that were chosen, bends and parts of the start and the goal
+        included; inf if none was.
     cost, bound : float
         No route whose chosen grasps keep the floor costs less than the bound.
     programs : int

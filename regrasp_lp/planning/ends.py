@@ -3,12 +3,12 @@
 A given grasp cannot be better than it is. So a slide away from it counts only where it falls below
 the grasp it comes from: its other end is *visible* from there, that is, the straight slide stays
 at the margin of the given grasp. To rest on a part of it, its other contacts released or not yet
-placed, is a choice: such a grasp counts like any other.
+placed, is a choice like any other: a switch to the set of that part.
 """
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 from dataclasses import dataclass, field
 from functools import cached_property
 
@@ -20,7 +20,8 @@ from regrasp_lp.grasp_sets.collection import GraspSets
 from regrasp_lp.linear_sets import LinearSets
 from regrasp_lp.lp.linear_program import minimise
 from regrasp_lp.planning.levels import ACCURACY, PieceRows
-from regrasp_lp.planning.moves import Contacts, Moves
+from regrasp_lp.planning.moves import Contacts, Moves, common_contacts
+from regrasp_lp.torque import TorqueFunctions, torque_functions
 
 _NAMES = ["f0", "f1", "f2"]
 
@@ -33,7 +34,7 @@ _FIRST = 64
 
 @dataclass(frozen=True, eq=False)
 class Support:
-    """A grasp set that holds a given grasp, or some of its contacts.
+    """A grasp set that holds a given grasp.
 
     Parameters
     ----------
@@ -41,20 +42,14 @@ class Support:
     index : int
         Number of the set.
     contacts : tuple of int
-        Which contacts of the given grasp are its contacts, in its order.
-    others : int
-        How many contacts of the given grasp are not.
+        The contacts of the given grasp in the order of the set.
     fractions : numpy.ndarray, shape (m,)
-    chosen : bool
-        Whether these contacts, without the others, are a grasp that counts.
     """
 
     rows: PieceRows
     index: int
     contacts: tuple[int, ...]
-    others: int
     fractions: FloatArray
-    chosen: bool = False
     _found: list[Landing] = field(default_factory=list)
 
     @cached_property
@@ -77,9 +72,24 @@ class Support:
         return float(level)
 
     @property
-    def limit(self) -> float:
-        """A level that no way over these contacts exceeds, whatever it leads to."""
-        return self.level if self.chosen else np.inf
+    def part(self) -> Support:
+        """What holds the object."""
+        return self
+
+    @property
+    def edges(self) -> IntArray:
+        """The edges of the contacts, shape (m,)."""
+        edges = self.rows.edges[self.index]
+        return np.asarray(edges[edges >= 0])
+
+    @property
+    def functions(self) -> TorqueFunctions:
+        """The torque functions of these edges."""
+        return self.rows.functions(self.index)
+
+    def ways(self, moves: Moves) -> Iterable[Contacts]:
+        """Return the switches that hold contacts of the given grasp, by their number."""
+        return moves.of(self.index)
 
     def level_in(self, piece: tuple[int, int]) -> float:
         """Return what a piece leaves of the level of the given contacts."""
@@ -205,10 +215,8 @@ class Support:
 
     def cap(self, moves: Moves) -> float:
         """Return a level that no way from here exceeds; if all sets are plain, the largest."""
-        if self.chosen:
-            return self.level
         best = self.widest
-        for contacts in moves.of(self.index):
+        for contacts in self.ways(moves):
             bounds = self.rows.best[contacts.others]
             # Those of sets with better grasps first, until no other set has any.
             order = np.argsort(-bounds, kind="stable")
@@ -231,6 +239,66 @@ class Support:
 
 
 @dataclass(frozen=True, eq=False)
+class Touching(Support):
+    """All of a given grasp, while a set holds the object that has only some of its contacts.
+
+    That set does not count: fingers are placed around the given grasp, or it is placed, before
+    anything is released. A set that holds all of it does as much, but of the chapter's there may be
+    none.
+
+    Parameters
+    ----------
+    by : Support
+        What holds the object meanwhile.
+    segments : numpy.ndarray of int, shape (m,)
+        The edges of all contacts, ascending.
+    fingers : int
+        Of the hand.
+    """
+
+    by: Support = field(kw_only=True)
+    segments: IntArray = field(kw_only=True)
+    fingers: int = field(kw_only=True)
+
+    @property
+    def part(self) -> Support:
+        """What holds the object."""
+        return self.by
+
+    @property
+    def edges(self) -> IntArray:
+        """The edges of all contacts."""
+        return self.segments
+
+    @cached_property
+    def functions(self) -> TorqueFunctions:
+        """The torque functions of all contacts."""
+        return torque_functions(self.rows.cones, self.segments[None])
+
+    def inside(self, least: float) -> list[tuple[int, int]]:
+        """Return no pieces: its contacts are not in one set."""
+        return []
+
+    def landings(self, least: float) -> Iterator[Landing]:
+        """Return no slides."""
+        return iter(())
+
+    @property
+    def widest(self) -> float:
+        """No slide leads away."""
+        return -np.inf
+
+    def ways(self, moves: Moves) -> Iterable[Contacts]:
+        """Yield the switches that can be made while all contacts touch, by their number."""
+        found = [contacts.others for contacts in moves.of(self.index)]
+        others = np.unique(np.concatenate((*found, np.zeros(0, dtype=np.intp))))
+        needed = len(self.segments) + self.rows.contacts[others] - self.fingers
+        for held in range(len(self.segments), 0, -1):
+            yield common_contacts(self.rows.edges, self.segments, others[needed <= held], held)
+        yield Contacts.free(others[needed <= 0])
+
+
+@dataclass(frozen=True, eq=False)
 class Landing:
     """Where a slide away from a given grasp may end.
 
@@ -249,8 +317,10 @@ class Landing:
     visible: LinearSets
 
 
-def supports(rows: PieceRows, sets: GraspSets, grasp: Grasp) -> list[Support]:
-    """Return the sets that hold a given grasp or some of its contacts; some are a choice.
+def supports(
+    rows: PieceRows, sets: GraspSets, grasp: Grasp, fingers: int, *, every: bool = True
+) -> list[Support]:
+    """Return what holds a given grasp.
 
     Parameters
     ----------
@@ -259,18 +329,27 @@ def supports(rows: PieceRows, sets: GraspSets, grasp: Grasp) -> list[Support]:
     sets : GraspSets
     grasp : Grasp
         Resolved.
+    fingers : int
+        Of the hand.
+    every : bool
+        Whether there is a set for every grasp. Then those of parts of a grasp are not needed: what
+        a part can be switched to while all of the grasp touches, all of it can, too.
     """
-    return [
-        Support(
-            rows,
-            index,
-            some,
-            len(grasp) - len(some),
-            sets.fractions(index, grasp.fractions[list(some)]),
-            chosen=len(some) < len(grasp),
+    segments, fractions = sets.cones.places(grasp.edges, grasp.fractions)
+    order = np.lexsort((fractions, segments))
+    ends = segments[order], sets.cones.within(segments, fractions)[order]
+    whole, touching = [], []
+    for index, some in sets.holding(grasp):
+        f = sets.fractions(index, grasp.fractions[list(some)])
+        support = Support(rows, index, some, f)
+        if len(some) == len(grasp):
+            whole.append(support)
+            continue
+        contacts = tuple(order.tolist())
+        touching.append(
+            Touching(rows, index, contacts, ends[1], by=support, segments=ends[0], fingers=fingers)
         )
-        for index, some in sets.holding(grasp)
-    ]
+    return whole if whole and every else [*whole, *touching]
 
 
 def _seen(

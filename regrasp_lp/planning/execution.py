@@ -95,24 +95,40 @@ class Execution:
     def _arrive(self, stop: Stop, placed: dict[Contact, int]) -> None:
         self._index, self._fingers = stop.index, [placed[contact] for contact in stop.support]
 
-    def switch(self, index: int, held: Sequence[tuple[int, int]], fractions: FloatArray) -> None:
-        """Switch to another set: place its contacts that are not held, then release the others."""
+    def switch(
+        self,
+        index: int,
+        held: Sequence[tuple[int, int]],
+        fractions: FloatArray,
+        goal: Grasp | None = None,
+    ) -> None:
+        """Switch to another set: place its contacts that are not held, then release the others.
+
+        With a goal its other contacts are placed, too, before anything is released.
+        """
         grasp = self._sets.grasp(index, fractions, self._given)
         groups = self._of_hand.groups(index).tolist()
         fingers = [0] * len(grasp)
         for here, there in held:
             fingers[there] = self._fingers[here]
-        for finger in self._fingers:  # a finger that happens to be where one is wanted stays
+        for finger in self._touching:  # a finger that happens to be where one is wanted stays
             where = [n for n, c in enumerate(grasp) if c == self._touching[finger]]
             if where and fingers[where[0]] == 0 and finger not in fingers:
                 fingers[where[0]] = finger
         new = [slot for slot, finger in enumerate(fingers) if finger == 0]
-        leaving = sorted(set(self._fingers) - set(fingers))
+        kept = set(goal or ())
+        leaving = sorted(
+            finger
+            for finger, contact in self._touching.items()
+            if finger not in fingers and contact not in kept
+        )
         for slot in new:
             fingers[slot] = self._of_hand.free(self._touching, groups[slot])
             if slot == new[-1] and not leaving:
                 self._fingers, self._index = fingers, index
             self._do(Place(fingers[slot], grasp[slot]))
+        if goal is not None:
+            self.place_others(goal)
         self._fingers, self._index = fingers, index
         for finger in leaving:
             self._do(Release(finger))
@@ -123,6 +139,7 @@ class Execution:
         held: Sequence[Sequence[tuple[int, int]]],
         grasps: Sequence[Sequence[FloatArray] | FloatArray],
         goal: Grasp,
+        touching: tuple[bool, bool] = (False, False),
     ) -> None:
         """Slide and switch through grasps of a path of sets, to a goal that the last one holds.
 
@@ -135,11 +152,15 @@ class Execution:
         grasps : sequence of sequence of numpy.ndarray
             Per set the fractions of its grasps, from arriving to leaving.
         goal : Grasp
+        touching : (bool, bool)
+            See `Passage`.
         """
-        self.release_others()
+        if not touching[0]:
+            self.release_others()
         for t, (index, nodes) in enumerate(zip(path, grasps, strict=True)):
             if t:
-                self.switch(index, held[t - 1], nodes[0])
+                last = touching[1] and t == len(path) - 1
+                self.switch(index, held[t - 1], nodes[0], goal if last else None)
             for node in nodes[1:]:
                 self.slide(node)
         self.place_others(goal)

@@ -13,6 +13,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from regrasp_lp.contact import Contact, Grasp
+from regrasp_lp.errors import HandError
 from regrasp_lp.friction import BoolArray, IntArray
 from regrasp_lp.grasp_sets.collection import GraspSets
 from regrasp_lp.grasp_sets.spacing import assignments
@@ -48,7 +49,7 @@ class Fingers:
     def goals(self, goal: Grasp) -> list[tuple[int, tuple[int, ...]]]:
         """Return the sets that hold the goal, with fingers left for its other contacts."""
         found = self.sets.holding(goal)
-        if len(self.hand.groups) == 1:
+        if len(self.hand.groups) == 1 and not self.hand.only_slide:
             return found
         return [
             (i, some) for i, some in found if self.placed(goal, some, self.groups(i)) is not None
@@ -114,9 +115,21 @@ class Fingers:
         return np.concatenate(parts)
 
     def free(self, touching: Iterable[int], group: int | None = None) -> int:
-        """Return the first finger that does not touch, of one group or of any."""
+        """Return the first finger that does not touch, of one group or of any.
+
+        Raises
+        ------
+        HandError
+            If all of them touch.
+        """
         busy = set(touching)
         among: Sequence[int] = range(1, self.hand.fingers + 1)
         if group is not None:
             among = self.hand.groups[group]
-        return next(finger for finger in among if finger not in busy)
+        for finger in among:
+            if finger not in busy:
+                return finger
+        raise HandError(
+            f"all of fingers {', '.join(map(str, among))} touch the object: none of them is free "
+            "to be placed; give the hand more fingers"
+        )

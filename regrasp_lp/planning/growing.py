@@ -62,7 +62,7 @@ class GrowingMoves:
             np.column_stack((np.tile(pair, (len(every), 1)), every)) for pair in sorted(pairs)
         ]
         others = self._sets(np.concatenate(triples))
-        return common_contacts(self.rows.edges, index, others, 2)
+        return common_contacts(self.rows.edges, self.rows.edges[index], others, 2)
 
     def _from_two(self, index: int) -> list[Contacts]:
         """Switches from two contacts that hold the object alone, given or not."""
@@ -74,7 +74,7 @@ class GrowingMoves:
         triples = [np.column_stack((np.full(len(one), edge), one, other)) for edge in edges]
         pairs = self._sets(two_finger_candidates(self.cones))
         others = np.concatenate((self._sets(np.concatenate(triples)), pairs))
-        single = common_contacts(self.rows.edges, index, others, 1)
+        single = common_contacts(self.rows.edges, self.rows.edges[index], others, 1)
         return [self._thirds(index), single, Contacts.free(pairs)]
 
     def _from_three(self, index: int) -> list[Contacts]:
@@ -82,7 +82,10 @@ class GrowingMoves:
         if index >= self._given or self.rows.measure == "margin":
             return []
         pairs = self._sets(two_finger_candidates(self.cones))
-        return [self._thirds(index), common_contacts(self.rows.edges, index, pairs, 1)]
+        return [
+            self._thirds(index),
+            common_contacts(self.rows.edges, self.rows.edges[index], pairs, 1),
+        ]
 
     def _sets(self, combinations: IntArray) -> IntArray:
         """The numbers of those of some combinations that exist; new ones are added."""

@@ -72,10 +72,6 @@ class Goal(Protocol):
     def index(self) -> int:
         """Its number."""
 
-    @property
-    def others(self) -> int:
-        """Placements that are needed there."""
-
 
 @dataclass(frozen=True, eq=False)
 class KnownMoves:
@@ -102,7 +98,7 @@ class KnownMoves:
         return self._known[index]
 
     def _choices(self, index: int) -> list[Contacts]:
-        contacts = self.rows.contacts
+        contacts, edges = self.rows.contacts, self.rows.edges
         mine = int(contacts[index])
         others, most = self.switches.neighbors(index)
         others, most = np.append(others, index), np.append(most, mine - 1)
@@ -110,7 +106,7 @@ class KnownMoves:
         for held in range(mine, 0, -1):
             possible = (most >= held) & (self.hand.needs[mine, contacts[others]] <= held)
             chosen = others[possible].astype(np.intp)
-            found.append(common_contacts(self.rows.edges, index, chosen, held))
+            found.append(common_contacts(edges, edges[index], chosen, held))
         free = np.flatnonzero(self.hand.needs[mine, contacts] == 0)
         return [*found, Contacts.free(free)]
 
@@ -122,7 +118,7 @@ class KnownMoves:
         alive = cut.any_alive(np.arange(len(self.rows)))
         go = np.full(len(alive), FAR)
         for goal in goals:
-            go[goal.index] = min(go[goal.index], goal.others)
+            go[goal.index] = 0
         if isinstance(self.switches, StoredSwitches):
             go = self._placements(alive, go)
         else:
@@ -147,20 +143,21 @@ class KnownMoves:
                 return go
 
 
-def common_contacts(edges: IntArray, index: int, others: IntArray, held: int) -> Contacts:
+def common_contacts(edges: IntArray, mine: IntArray, others: IntArray, held: int) -> Contacts:
     """Return all choices of so many contacts on equal edges of a set and others.
 
     Parameters
     ----------
     edges : numpy.ndarray of int, shape (N, 3)
         Edges of the contacts of all sets, -1 beyond.
-    index : int
+    mine : numpy.ndarray of int, shape (m,)
+        The edges of the set, -1 beyond.
     others : numpy.ndarray of int, shape (K,)
         The set itself may be one: of two contacts on one edge either can be held in place of both.
     held : int
         At least 1.
     """
-    mine = edges[index][edges[index] >= 0]
+    mine = mine[mine >= 0]
     equal = edges[others][:, None, :] == mine[:, None]
     rows, here_, there_ = [], [], []
     for here in combinations(range(len(mine)), held):

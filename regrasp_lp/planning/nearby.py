@@ -200,7 +200,7 @@ class Surroundings:
         ends = {*_held_by(self.cones, self.start), *_held_by(self.cones, self.goal)}
         sets = problem_over(self.polygon, self.cones, self.solver, ends).sets
         rows = PieceRows(sets.sources, self.measure)
-        return rows, [supports(rows, sets, grasp) for grasp in (self.start, self.goal)]
+        return rows, [supports(rows, sets, grasp, 4) for grasp in (self.start, self.goal)]
 
     @cached_property
     def _moves(self) -> GrowingMoves:

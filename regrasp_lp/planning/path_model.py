@@ -39,6 +39,22 @@ class PathModel:
     steps : PathSteps
     solver : Solver
         Of this package's own linear programs.
+
+    Examples
+    --------
+    Its constraints, with variables and an objective of one's own:
+
+    >>> import cvxpy as cp
+    >>> import regrasp_lp as rl
+    >>> block = rl.Polygon([(0, 0), (6, 0), (6, 3), (0, 3)])
+    >>> graph = rl.build_switching_graph(block, friction=0.4)
+    >>> path = graph.path_set([0, 1], start=[(0, 3), (2, 3)])
+    >>> path.names
+    ('u[1,0]', 'u[1,2]', 'u[2,1]', 'u[2,3]', 'u[3,1]', 'u[3,3]')
+    >>> slant = path.variables["u[2,1]"] + path.variables["u[2,3]"] - 3
+    >>> most = cp.Problem(cp.Maximize(slant), path.constraints_at(0.2))
+    >>> round(float(most.solve()), 3)
+    1.969
     """
 
     steps: PathSteps

@@ -37,6 +37,9 @@ class Passage:
         Which contacts of the start are those of the first set, in its order.
     stages : tuple of Stage
         The pieces of the slides; only for aligning by repositioning.
+    touching : (bool, bool)
+        Whether all of the start touches until the first switch is made, and all of the goal when
+        the last one is.
     """
 
     path: tuple[int, ...]
@@ -44,6 +47,7 @@ class Passage:
     grasps: tuple[FloatArray, ...]
     chosen: tuple[int, ...]
     stages: tuple[Stage, ...] = ()
+    touching: tuple[bool, bool] = (False, False)
 
 
 def perform(
@@ -77,7 +81,7 @@ def perform(
         for stop in _stops(problem, passage, start, goal):
             run.hop(stop)
     else:
-        run.along(passage.path, passage.held, passage.grasps, goal)
+        run.along(passage.path, passage.held, passage.grasps, goal, passage.touching)
     return _verified(problem, run, fingers, goal)
 
 

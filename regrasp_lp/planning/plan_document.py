@@ -18,6 +18,7 @@ from regrasp_lp.errors import FileFormatError
 
 FORMAT = "regrasp-plan"
 VERSION = 1
+_GEOJSON = ("FeatureCollection", "Feature", "Polygon", "MultiPolygon", "GeometryCollection")
 
 Place: TypeAlias = tuple[int, float]
 """An edge and a fraction of its length."""
@@ -96,6 +97,9 @@ def parse_document(document: object) -> PlanDocument:
     """
     plan = _mapping(document, "the document")
     found = (plan.get("format"), plan.get("version"))
+    if found[0] is None:
+        what = "GeoJSON, which has objects" if plan.get("type") in _GEOJSON else "other JSON"
+        raise FileFormatError(f'this is no plan, which has "format": "{FORMAT}", but {what}')
     if found[0] != FORMAT or found[1] != VERSION or isinstance(found[1], bool):
         raise FileFormatError(
             f"expected format {FORMAT!r} version {VERSION}, found format {found[0]!r} version "

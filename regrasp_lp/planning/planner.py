@@ -27,7 +27,7 @@ from regrasp_lp.planning.alternatives import (
 from regrasp_lp.planning.bottleneck import Route
 from regrasp_lp.planning.clearing import clearing_search
 from regrasp_lp.planning.costs import Budget
-from regrasp_lp.planning.ends import supports
+from regrasp_lp.planning.ends import Support, supports
 from regrasp_lp.planning.fingers import Fingers
 from regrasp_lp.planning.hand import Hand
 from regrasp_lp.planning.levels import PieceRows
@@ -212,7 +212,7 @@ class PlanningProblem:
         """The plans with the largest least margin or tolerance, by pieces cut at a level."""
         rows = self._margin_rows if objective.name == "margin" else self._tolerance_rows
         moves = KnownMoves(rows, remembered(self.switches), self.hand)
-        first, last = (supports(rows, self.sets, grasp) for grasp in (start, goal))
+        first, last = (self._supports(rows, grasp) for grasp in (start, goal))
         search = WidestProblem(rows, moves, self.hand, self.solver, first, last)
         routes = WidestRoutes(search, steering.through)
         found = replace(routes.best, bound=self._bound(routes.best, search, start, goal))
@@ -241,25 +241,30 @@ class PlanningProblem:
             yield replace(plan, objective=objective, bound=best.bound)
 
     def _bound(self, found: Widest, search: WidestProblem, start: Grasp, goal: Grasp) -> float:
-        """The bound of a search, for margins as grasps have them, and whatever touches.
+        """The bound of a search, for margins as grasps have them.
 
         The functions of a parallel set are the chapter's, with margins below those of its grasps;
-        so the bound is that of the same search with all functions of its edges. And of the
-        chapter's sets none may hold all of the start or the goal (`WidestProblem.loosened`).
+        so the bound is that of the same search with all functions of its edges.
         """
         families = self.sets.families
-        kinds = {family.kind for family in families}
-        if np.isinf(found.bound) or not kinds & {"concurrent", "parallel"}:
+        if self._chapters and len(self.hand.groups) > 1:
+            return np.inf  # which finger is where while all of the start touches is not known
+        if all(family.kind != "parallel" for family in families) or np.isinf(found.bound):
             return found.bound
-        problem = search
-        if "parallel" in kinds:
-            every = [torque_functions(f.functions.cones, f.functions.edges) for f in families]
-            rows = PieceRows(every, search.rows.measure)
-            moves = KnownMoves(rows, remembered(self.switches), self.hand)
-            first, last = (supports(rows, self.sets, grasp) for grasp in (start, goal))
-            problem = replace(search, rows=rows, moves=moves, starts=first, goals=last, _cuts={})
-        problem = problem.loosened()
-        return found.bound if problem is search else problem.solve().bound
+        every = [torque_functions(f.functions.cones, f.functions.edges) for f in families]
+        rows = PieceRows(every, search.rows.measure)
+        moves = KnownMoves(rows, remembered(self.switches), self.hand)
+        first, last = (self._supports(rows, grasp) for grasp in (start, goal))
+        search = WidestProblem(rows, moves, self.hand, self.solver, first, last)
+        return search.solve().bound
+
+    def _supports(self, rows: PieceRows, grasp: Grasp) -> list[Support]:
+        return supports(rows, self.sets, grasp, self.hand.fingers, every=not self._chapters)
+
+    @property
+    def _chapters(self) -> bool:
+        """Whether the sets are the chapter's, which do not hold all grasps."""
+        return any(family.kind in ("concurrent", "parallel") for family in self.sets.families)
 
     def _cheapest(
         self, start: Grasp, goal: Grasp, aligning: str, objective: Objective, steering: Steering
@@ -309,10 +314,16 @@ class PlanningProblem:
 
     def _terminals(self, grasp: Grasp) -> list[Terminal]:
         """The sets that hold a given grasp, and how many of its contacts each leaves out."""
-        return [
-            Terminal(i, self._fractions(i, grasp, chosen), len(grasp) - len(chosen))
-            for i, chosen in self.sets.holding(grasp)
-        ]
+        found = []
+        for i, some in self.sets.holding(grasp):
+            f, left = self._fractions(i, grasp, some), len(grasp) - len(some)
+            end = Terminal(i, f, left)
+            if left and not self._chapters:  # these may hold while all of the grasp touches
+                functions, size = self.sets.functions(i), self.sets.cones.size
+                levels = float(functions.margins(f)[0]), float(functions.tolerances(f)[0])
+                end = replace(end, most=(levels[0] / size, levels[1] / size))
+            found.append(end)
+        return found
 
     def along_route(
         self,
@@ -359,7 +370,13 @@ class PlanningProblem:
         """The verified plan along a route."""
         path = tuple(leg.index for leg in route.legs)
         stages = tuple(leg.stage(self.sets.functions(leg.index)) for leg in route.legs)
-        passage = Passage(path, route.held, tuple(grasps), route.start.contacts, stages)
+        held, grasps = list(route.held), list(grasps)
+        first, last = route.start.part, route.goal.part
+        touching = first is not route.start, last is not route.goal
+        for n, part in ((0, first), (-1, last)):
+            if touching[n]:  # fingers are known by where they are
+                held[n], grasps[n] = (), part.fractions[None]
+        passage = Passage(path, tuple(held), tuple(grasps), first.contacts, stages, touching)
         return perform(self, passage, start, goal, aligning)
 
     def _fractions(self, index: int, grasp: Grasp, chosen: tuple[int, ...]) -> FloatArray:

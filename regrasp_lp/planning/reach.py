@@ -20,7 +20,7 @@ from regrasp_lp.errors import HandError
 from regrasp_lp.friction import UNIT_ROUNDOFF, Cones
 from regrasp_lp.grasp_sets.spacing import Spacing, assignments
 from regrasp_lp.planning.hand import Hand
-from regrasp_lp.planning.touching import Intervals
+from regrasp_lp.planning.touching import Intervals, united_intervals
 from regrasp_lp.polygon import Polygon
 
 _LEAST = 2 * FRACTION_SNAP
@@ -50,7 +50,7 @@ def hand_cones(polygon: Polygon, friction: ArrayLike, hand: Hand) -> Cones:
     PolygonError, FrictionError
         As `Cones.of`.
     HandError
-        If the hand's `reachable` names an edge that the polygon does not have.
+        If `reachable` or `finger_reachable` names an edge that the polygon does not have.
     """
     cones = Cones.of(polygon, friction)
     if not (hand.edge_clearance or hand.reachable or hand.finger_reachable or hand.coupled):
@@ -58,8 +58,9 @@ def hand_cones(polygon: Polygon, friction: ArrayLike, hand: Hand) -> Cones:
     reach = [hand.intervals_of(group[0]) for group in hand.groups]
     named = max((edge for intervals in reach for edge in intervals), default=-1)
     if named >= polygon.n_edges:
+        where = "reachable" if named in hand.intervals else "finger_reachable"
         raise HandError(
-            f"reachable names edge {named}; {polygon.name or 'the polygon'} has edges 0 to "
+            f"{where} names edge {named}; {polygon.name or 'the polygon'} has edges 0 to "
             f"{polygon.n_edges - 1}"
         )
     segments = sorted(
@@ -195,18 +196,20 @@ def room(cones: Cones, hand: Hand, contacts: Mapping[int, Contact]) -> float:
 
 def _allowed(cones: Cones, hand: Hand, contact: Contact, finger: int | None) -> str:
     """Where on the edge of a contact a hand (a finger of it) may touch, and why not elsewhere."""
-    here = cones.edge == contact.edge
-    who, intervals = "the hand", hand.intervals
+    edge, common = contact.edge, hand.intervals
+    here = cones.edge == edge
+    who, fingers = "the hand", list(range(1, hand.fingers + 1))
     if finger is not None and len(hand.groups) > 1:
-        who, intervals = f"finger {finger}", hand.intervals_of(finger)
+        who, fingers = f"finger {finger}", [finger]
         here &= cones.group == hand.group_of(finger)
     limits = [f"edge_clearance={hand.edge_clearance:g}"] if hand.edge_clearance else []
-    limits += ["reachable"] if contact.edge in hand.intervals else []
-    limits += ["finger_reachable"] if intervals.keys() - hand.intervals.keys() else []
-    length = cones.whole.lengths[contact.edge]
+    limits += ["reachable"] if edge in common else []
+    own = any(hand.intervals_of(k).get(edge) != common.get(edge) for k in fingers)
+    limits += ["finger_reachable"] if own else []
+    length = cones.whole.lengths[edge]
+    ends = zip(cones.lower[here].tolist(), cones.upper[here].tolist(), strict=True)
     parts = [
-        f"from {low * length:.6g} to {high * length:.6g}"
-        for low, high in zip(cones.lower[here], cones.upper[here], strict=True)
+        f"from {low * length:.6g} to {high * length:.6g}" for low, high in united_intervals(ends)
     ]
     where = " and ".join(parts) if parts else "nowhere"
     return f"{who} may not touch: {where} on this edge ({' and '.join(limits)} of the hand)"

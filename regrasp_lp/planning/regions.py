@@ -74,6 +74,15 @@ class Region:
     before : Box or None
         Of a slide: the region where it begins; it moves at constant speed to `box`, and wherever
         the contacts are in it at an instant, the object is held. None for a grasp at rest.
+
+    Examples
+    --------
+    >>> import regrasp_lp as rl
+    >>> block = rl.Polygon([(0, 0), (6, 0), (6, 3), (0, 3)])
+    >>> plan = rl.plan_regrasp(block, [(0, 3), (2, 3)], [(1, 1.5), (3, 1.5)], friction=0.4)
+    >>> start = plan.regions()[0]
+    >>> start.fingers, start.widths.round(6).tolist()
+    ((1, 2), [[0.6, 0.6], [0.6, 0.6]])
     """
 
     step: int

@@ -40,11 +40,15 @@ class Terminal:
         Of the set's contacts, in its order.
     placed : int
         Of a goal, how many of its contacts are placed when the set has its own.
+    most : (float, float)
+        Margin and tolerance of these contacts, in the object's size, where they are only some of
+        the start or the goal: to rest on them is a choice. inf where they are given.
     """
 
     index: int
     fractions: FloatArray
     placed: int = 0
+    most: tuple[float, float] = (np.inf, np.inf)
 
 
 @dataclass(frozen=True)
@@ -149,6 +153,11 @@ class RoutePrograms:
             self._known[index] = set_rows(functions, margin, columns, self.least, self.most)
         return self._known[index]
 
+    def ends(self, route: Route) -> tuple[Terminal, ...]:
+        """Return the start and, once it is reached, the goal of a route."""
+        start = self.starts[route.origin]
+        return (start, self.goals[route.aim]) if route.ended else (start,)
+
     def solve(self, route: Route) -> Contacts | None:
         """Return the best contacts, or None if multipliers prove that there are none.
 
@@ -177,15 +186,18 @@ class RoutePrograms:
         Returns
         -------
         Contacts or None
-            None where rounding forbids it.
+            None where rounding forbids it, or where a set has no grasp as good as `least`.
         """
         layout = _Layout.of(self, replace(route, choices=()))
         if layout is None:
             return None
         for grasp in layout.free:
             for number, choice in enumerate(self.set_rows(route.path[grasp // 2]).choices):
-                row = int(choice.slack(grasps[grasp]).argmax())
-                layout = replace(layout, route=layout.route.choosing(grasp, number, row))
+                slack = choice.slack(grasps[grasp])
+                if not slack.size:
+                    return None
+                route = layout.route.choosing(grasp, number, int(slack.argmax()))
+                layout = replace(layout, route=route)
         return layout.solve(travel)
 
 
@@ -293,6 +305,7 @@ class _Layout:
         """What margin and tolerance are at most, in these sets and on the way on."""
         route, onwards = self.route, self.programs.onwards
         bounds = [self.programs.most, *(self._set(grasp).most for grasp in self.free)]
+        bounds += [np.array(end.most) for end in self.programs.ends(route)]
         if not route.ended and onwards is not None:
             bounds.append(onwards[route.path[-1]])
         return np.asarray(np.min(bounds, axis=0))

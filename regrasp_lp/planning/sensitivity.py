@@ -39,6 +39,17 @@ class Sensitivity:
         How far each finger may be off, step by step.
     spaced : bool
         Whether the hand limits distances between fingers: prices do not know of that.
+
+    Examples
+    --------
+    >>> import regrasp_lp as rl
+    >>> block = rl.Polygon([(0, 0), (6, 0), (6, 3), (0, 3)], name="block")
+    >>> plan = rl.plan_regrasp(block, [(0, 3), (2, 3)], [(1, 1), (3, 2)], friction=0.4)
+    >>> found = plan.sensitivity()
+    >>> round(found.margin.least, 4), len(found.regions)
+    (0.5571, 5)
+    >>> found.margin.tight[0].lines[0]
+    Line(finger=1, edge=0, side='clockwise', share=0.5)
     """
 
     name: str
@@ -149,5 +160,5 @@ def _regions(found: tuple[Region, ...]) -> list[str]:
                 f"{step:<12}{finger:>6}{contact.edge:>6}{at:>11}{tolerance:>11}"
                 f"{back:>11.4g}{ahead:>11.4g}"
             )
-            step = tolerance = ""
+            step = ""
     return lines

@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from regrasp_lp.errors import SolverError
 from regrasp_lp.friction import FloatArray
 from regrasp_lp.grasp_sets.set_pieces import with_rows
 from regrasp_lp.handovers import Handover, handovers
@@ -82,7 +83,10 @@ def _handover(problem: PlanningProblem, first: int, second: int, few: bool) -> H
         least = problem.hand.held(int(contacts[first]), int(contacts[second]))
         counts = list(range(least, most + 1))
     ways = (handovers(problem.sets, problem.solver, first, second, n) for n in counts)
-    return next(way[0] for way in ways if way)
+    found = next((way[0] for way in ways if way), None)
+    if found is None:
+        raise SolverError(f"no grasps of the switch from set {first} to set {second} are found")
+    return found
 
 
 def _stages(

@@ -343,7 +343,8 @@ def _realised(task: _Task, found: Beginning) -> Shortest:
 def _with_slides(task: _Task, route: Route, placed: int, contacts: Contacts) -> Shortest:
     sets = task.ground.sets
     size = sets.sources[0].cones.size
-    grasps, travel, levels = [], 0.0, np.full(2, np.inf)
+    ends = [end.most for end in task.programs.ends(route)]
+    grasps, travel, levels = [], 0.0, size * np.min(ends, axis=0)
     for t, index in enumerate(route.path):
         functions = sets.functions(index)
         f, g = contacts.grasps[2 * t : 2 * t + 2]

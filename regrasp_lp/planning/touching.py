@@ -106,6 +106,17 @@ def shared_intervals(one: Intervals, other: Intervals) -> Intervals:
     return tuple(sorted((low, high) for low, high in shared if low < high))
 
 
+def united_intervals(intervals: Iterable[tuple[float, float]]) -> Intervals:
+    """Return intervals in order; those that overlap or touch become one."""
+    united: list[tuple[float, float]] = []
+    for low, high in sorted(intervals):
+        if united and low <= united[-1][1]:
+            united[-1] = (united[-1][0], max(high, united[-1][1]))
+        else:
+            united.append((low, high))
+    return tuple(united)
+
+
 def reach_entries(reach: Iterable[tuple[int, Intervals]]) -> list[dict[str, Any]]:
     """Return what may be touched as files have it."""
     return [
@@ -120,19 +131,13 @@ def reach_from(entries: Iterable[Mapping[str, Any]]) -> list[tuple[int, Any]]:
 
 
 def _intervals(edge: int, value: object) -> Intervals:
-    """One interval, several or none; those that overlap or touch become one."""
+    """One interval, several or none."""
     if value is None:
         return ()
     entries = list(value) if isinstance(value, Iterable) else [value]
     if len(entries) == 2 and all(finite_number(entry) is not None for entry in entries):
         entries = [entries]
-    merged: list[tuple[float, float]] = []
-    for low, high in sorted(_interval(edge, entry) for entry in entries):
-        if merged and low <= merged[-1][1]:
-            merged[-1] = (merged[-1][0], max(high, merged[-1][1]))
-        else:
-            merged.append((low, high))
-    return tuple(merged)
+    return united_intervals(_interval(edge, entry) for entry in entries)
 
 
 def _interval(edge: int, entry: object) -> tuple[float, float]:

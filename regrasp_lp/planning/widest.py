@@ -8,8 +8,8 @@ attained meet at the optimum: no branching, no integers.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from dataclasses import dataclass, field, replace
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass, field
 from functools import cached_property
 from itertools import product
 
@@ -115,15 +115,17 @@ class WidestProblem:
         accuracy = self._accuracy(bound)
         best: Route | None = None
         level, given_up, searches = 0.0, 0, 0
-        # At the bound itself, where most optima are; then in the middle of what is left (or where
-        # a part of start or goal is the limit), and just above the best level so far, in turns.
+        # At the bound itself, where most optima are; then where a part of start or goal may be the
+        # limit, in the middle of what is left, and just above the best level so far, in turns.
         trial = bound
         while bound - level > accuracy and bound > _LEAST * self.rows.cones.size:
             search = self.search(trial)
             route = search.run()
             searches += 1
+            hoped = -np.inf
             if route is not None:
-                best, level = route, max(self._attained(route), trial)
+                attained, hoped = self._attained(route)
+                best, level = route, max(attained, trial)
             elif search.exhausted:
                 bound = min(bound, trial)
                 accuracy = self._accuracy(bound)
@@ -131,17 +133,12 @@ class WidestProblem:
                 given_up += 1
             if given_up == _PATIENT:
                 break
-            middle = self._middle(level + accuracy, bound - accuracy)
+            middle = (level + bound) / 2
             trial = middle if searches % 2 else min(level + accuracy, bound)
+            trial = hoped if level + accuracy < hoped < bound else trial
             if given_up:  # neither yes nor no: a lower level may be easier
                 trial = (level + trial) / 2
         return Widest(best, level if best is not None else -np.inf, max(bound, level), searches)
-
-    def _middle(self, low: float, high: float) -> float:
-        """The middle of two levels, or the nearest to it at which a way over a part of an end ends."""
-        middle = (low + high) / 2
-        limits = [s.limit for s in (*self.starts, *self.goals) if low < s.limit < high]
-        return min(limits, key=lambda limit: abs(limit - middle), default=middle)
 
     def _accuracy(self, bound: float) -> float:
         """How near to each other levels are told apart."""
@@ -154,16 +151,37 @@ class WidestProblem:
         cut = self._cuts[level]
         return Search(cut, self.moves, self.starts, self.goals, self.patience, self.back)
 
-    def _attained(self, route: Route) -> float:
+    def _attained(self, route: Route) -> tuple[float, float]:
+        """The level of a route, and the one that others through the same sets may have.
+
+        A part of start or goal has no variables, and so no rows in the path LP. It is in one piece,
+        which may leave less of its own level than another one.
+        """
         problem = self.path_problem(route)
         x = largest_tolerance(problem, self.solver.name)
-        ends = (route.start, route.legs[0].pieces[:1]), (route.goal, route.legs[-1].pieces[-1:])
-        chosen = [end.level_in(piece) for end, pieces in ends for piece in pieces if end.chosen]
-        return min(problem.tolerance(x) * self.rows.cones.size, *chosen, np.inf)
+        attained = hoped = problem.tolerance(x) * self.rows.cones.size
+        for part, piece in self._parts(route, problem):
+            attained, hoped = min(attained, part.level_in(piece)), min(hoped, part.level)
+        return attained, hoped
+
+    def _parts(
+        self, route: Route, problem: PathProblem
+    ) -> Iterator[tuple[Support, tuple[int, int]]]:
+        """Yield grasps on the way all of whose contacts are given, and the piece of each."""
+        last = len(route.legs) - 1
+        for t, leg in enumerate(route.legs):
+            ids, given = problem.variables[t], problem.given[t]
+            for node in range(len(ids) if leg.pieces else 0):
+                end = (t, node) in ((0, 0), (last, len(leg.pieces)))
+                if not end and (ids[node] < 0).all():
+                    piece = leg.pieces[min(node, len(leg.pieces) - 1)]
+                    yield Support(self.rows, leg.index, (), given[node]), piece
 
     def path_problem(self, route: Route) -> PathProblem:
         """Return the path LP of a route."""
-        stages = [leg.stage(self.rows.functions(leg.index)) for leg in route.legs]
+        functions = [self.rows.functions(leg.index) for leg in route.legs]
+        functions[0], functions[-1] = route.start.functions, route.goal.functions
+        stages = [leg.stage(own) for leg, own in zip(route.legs, functions, strict=True)]
         ends = route.start.fractions, route.goal.fractions
         return build_path_problem(
             stages, route.held, *ends, self.rows.measure, apart=_NEARLY_TOGETHER
@@ -173,32 +191,19 @@ class WidestProblem:
         """Return the best grasps along a route, per leg: leximin, then least travel."""
         return solve_path_problem(self.path_problem(route), self.solver.name, leximin=True)
 
-    def loosened(self) -> WidestProblem:
-        """Return the problem in which parts of start and goal do not count that need not.
-
-        While all contacts of the start touch, a part of it may hold the object until what comes
-        next is placed; and the same backwards from the goal. Of complete sets there is one for the
-        whole, which can then be switched as well; among others there may be none.
-        """
-        starts = _loosened(self.starts, self.moves, self.hand)
-        goals = _loosened(self.goals, self.back or self.moves, self.hand)
-        if not any(old != new for old, new in zip((*self.starts, *self.goals), (*starts, *goals), strict=True)):
-            return self
-        return replace(self, starts=starts, goals=goals)
-
     def directs(self) -> list[Route]:
         """Return the ways from start to goal on which no grasp is chosen."""
         return [
             route
             for start, goal in product(self.starts, self.goals)
-            if not (start.chosen or goal.chosen)
             for route in (self._one_slide(start, goal), self._one_switch(start, goal))
             if route is not None
         ]
 
     def _one_slide(self, start: Support, goal: Support) -> Route | None:
         """One slide that never falls below the smaller of the two given grasps."""
-        if start.index != goal.index:
+        touching = start.part is not start or goal.part is not goal
+        if start.index != goal.index or touching:
             return None
         functions = self.rows.functions(start.index)
         along = least_margin_along if self.rows.measure == "margin" else least_tolerance_along
@@ -207,35 +212,16 @@ class WidestProblem:
             return None
         # Any piece will do: there is nothing to choose.
         leg = Leg(start.index, tuple(start.inside(-np.inf)[:1]))
-        return Route((leg,), (), start, goal, goal.others)
+        return Route((leg,), (), start, goal, 0)
 
     def _one_switch(self, start: Support, goal: Support) -> Route | None:
         """One switch that holds what start and goal have in common."""
-        mine = [(e, f) for e, f in zip(*_places(start), strict=True)]
-        theirs = [(e, f) for e, f in zip(*_places(goal), strict=True)]
+        mine, theirs = (
+            list(zip(end.edges.tolist(), end.fractions.tolist(), strict=True))
+            for end in (start, goal)
+        )
         held = tuple((mine.index(c), n) for n, c in enumerate(theirs) if c in mine)
         if len(mine) + len(theirs) - len(held) > self.hand.fingers:
             return None
         legs = Leg(start.index, ()), Leg(goal.index, ())
-        return Route(legs, (held,), start, goal, len(theirs) - len(held) + goal.others)
-
-
-def _loosened(ends: Sequence[Support], moves: Moves, hand: Hand) -> list[Support]:
-    """The supports of start or goal; those count for nothing that can do what the whole cannot."""
-    whole = [c.others for s in ends if not s.chosen for c in moves.of(s.index)]
-    reached = np.concatenate((*whole, np.zeros(0, dtype=np.intp)))
-    found = []
-    for support in ends:
-        free = False
-        for contacts in moves.of(support.index) if support.chosen else ():
-            contacts_there = support.rows.contacts[contacts.others]
-            touching = len(support.fractions) + contacts_there - contacts.held
-            beside = touching <= hand.fingers  # other contacts of the given grasp may be theirs
-            free |= not np.isin(contacts.others[beside], reached).all()
-        found.append(replace(support, chosen=False) if free else support)
-    return found
-
-
-def _places(support: Support) -> tuple[list[int], list[float]]:
-    edges = support.rows.edges[support.index]
-    return edges[edges >= 0].tolist(), support.fractions.tolist()
+        return Route(legs, (held,), start, goal, len(theirs) - len(held))

@@ -33,6 +33,8 @@ _NARROWEST = 3.6  # for the words
 _HEAD, _BAR = 0.62, 0.07
 _FRAMES = 12  # of a slide
 _SLIDE_FRAME = 0.08  # seconds that each of them shows
+_AT_ENDS = 1.5  # times as long start and goal stay
+_LEAST, _MOST = 0.01, 436.0  # seconds: a file counts hundredths, up to 65,535 for start and goal
 
 
 class _State(NamedTuple):
@@ -54,19 +56,29 @@ def plan_gif(plan: Plan, *, seconds: float = 1.5, dpi: float = 80.0) -> bytes:
     ----------
     plan : Plan
     seconds : float, optional
-        How long each state stays; start and goal stay half as long again.
+        How long each state stays, from 0.01 to 436; start and goal stay half as long again.
     dpi : float, optional
         Pixels per inch; the longer side of the object is about 4 inches long.
 
     Raises
     ------
     OptionError
-        If `seconds` or `dpi` is not a positive number.
+        If `seconds` or `dpi` is not a positive number, or `seconds` beyond what a GIF can say.
+
+    Examples
+    --------
+    >>> import regrasp_lp as rl
+    >>> block = rl.Polygon([(0, 0), (6, 0), (6, 3), (0, 3)])
+    >>> plan = rl.plan_regrasp(block, [(0, 3), (2, 3)], [(1, 1.5), (3, 1.5)], friction=0.4)
+    >>> plan_gif(plan, dpi=20)[:6]
+    b'GIF89a'
     """
     for name, value in (("seconds", seconds), ("dpi", dpi)):
         a_number = isinstance(value, Real) and not isinstance(value, bool)
         if not (a_number and 0 < value < math.inf):
             raise OptionError(f"{name} has to be a positive number, not {value!r}")
+    if not _LEAST <= seconds <= _MOST:
+        raise OptionError(f"seconds has to be from {_LEAST} to {_MOST:g} in a GIF, not {seconds!r}")
     from PIL import Image  # matplotlib brings it
 
     states = list(_states(plan, seconds))
@@ -93,7 +105,7 @@ def _states(plan: Plan, seconds: float) -> Iterator[_State]:
         if index and isinstance(plan.steps[index - 1], Slide):
             for k in range(1, _FRAMES):
                 yield _State(index - 1, k / _FRAMES, _SLIDE_FRAME)
-        yield _State(index, 0.0, seconds * (1.5 if index in (0, last) else 1.0))
+        yield _State(index, 0.0, seconds * (_AT_ENDS if index in (0, last) else 1.0))
 
 
 def _frame(plan: Plan, state: _State, dpi: float) -> Pixels:
@@ -167,17 +179,19 @@ def _draw_bar(figure: OwnFigure, done: float) -> None:
         figure.add_artist(bar)
 
 
-def _in_colours(frames: Sequence[Pixels]) -> tuple[Pixels, list[int]]:
+def _in_colours(frames: Sequence[Pixels]) -> tuple[list[Pixels], list[int]]:
     """Frames as numbers of at most 256 colours, the same for all, and these colours.
 
     They are those that occur most often, so that surfaces and lines keep theirs and nothing
     flickers; what is in none of them gets the nearest one.
     """
-    shifts = np.array([16, 8, 0])
-    packed = (np.stack(frames).astype(np.int32) << shifts).sum(axis=3)
-    found, places, counts = np.unique(packed, return_inverse=True, return_counts=True)
+    shifts = np.array([16, 8, 0], dtype=np.int32)
+    packed = [(frame.astype(np.int32) << shifts).sum(axis=2) for frame in frames]
+    values, counts = zip(*(np.unique(one, return_counts=True) for one in packed), strict=True)
+    found, places = np.unique(np.concatenate(values), return_inverse=True)
+    often = np.bincount(places, np.concatenate(counts))
     colours = (found[:, None] >> shifts) & 255
-    chosen = colours[np.argsort(-counts, kind="stable")[:256]]
+    chosen = colours[np.argsort(-often, kind="stable")[:256]]
     offsets = colours[:, None] - chosen
     nearest = (offsets * offsets).sum(axis=2).argmin(axis=1).astype(np.uint8)
-    return nearest[places.reshape(packed.shape)], chosen.reshape(-1).tolist()
+    return [nearest[np.searchsorted(found, one)] for one in packed], chosen.reshape(-1).tolist()

@@ -10,6 +10,7 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure, SubFigure
+from matplotlib.lines import Line2D
 from matplotlib.transforms import ScaledTranslation, Transform
 
 from regrasp_lp.errors import OptionError
@@ -139,6 +140,13 @@ def fit(ax: Axes, bounds: FloatArray, margin: float = MARGIN) -> Frame:
     ax.set_xlim(low[0], high[0])
     ax.set_ylim(low[1], high[1])
     return Frame.of(ax)
+
+
+def draw_line(ax: Axes, points: FloatArray, **style: Any) -> Line2D:
+    """Draw points, shape (K, 2), joined by a line."""
+    line = Line2D(*points.T, **style)
+    ax.add_line(line)
+    return line
 
 
 def shifted(ax: Axes, offset: FloatArray) -> Transform:

@@ -13,7 +13,6 @@ from matplotlib.axes import Axes
 from matplotlib.lines import Line2D
 from matplotlib.patches import FancyArrowPatch
 from matplotlib.patches import Polygon as Wedge
-from matplotlib.text import Text
 
 from regrasp_lp.circuits import cross
 from regrasp_lp.contact import Contact, Grasp
@@ -21,17 +20,23 @@ from regrasp_lp.errors import OptionError
 from regrasp_lp.friction import Cones, FloatArray
 from regrasp_lp.grasp_sets.candidates import common_cone
 from regrasp_lp.plotting import palette
-from regrasp_lp.plotting.frame import Drawing, Frame, shifted
-from regrasp_lp.plotting.outline import PolygonArtists, number_edges, paper_of, plot_polygon
-from regrasp_lp.plotting.placement import Label, Placed, Search, place
+from regrasp_lp.plotting.fingers import (
+    RELEASED,
+    FingerArtists,
+    draw_finger,
+    place_fingers,
+    point_of,
+    style_of,
+)
+from regrasp_lp.plotting.frame import Drawing, Frame, draw_line, shifted
+from regrasp_lp.plotting.outline import PolygonArtists, number_edges, plot_polygon
+from regrasp_lp.plotting.sight import visible_part
 from regrasp_lp.polygon import Polygon
 
 Contacts: TypeAlias = Mapping[int, Contact] | Grasp | Iterable[Contact | tuple[int, float]]
 
 _ARROW_SHIFT = 4.5  # points from an edge to the arrow of a slide along it
 _ARROW_LEAST = 11.0  # length of the shortest arrow, in points
-_TURNS = (0, 20, -20, 40, -40, 60, -60, 80, -80, 110, -110, 145, -145)
-_SEARCH = Search(palette.FINGER_GAP, (0, 5, 11, 18, 27, 38), _TURNS, sweeps=3)
 FORCE: dict[str, Any] = {
     "color": palette.GREEN,
     "linestyle": palette.DASHES,
@@ -57,28 +62,6 @@ COMMON_CONE: dict[str, Any] = {
 }
 
 
-@dataclass(frozen=True, eq=False)
-class FingerArtists:
-    """How one finger is drawn.
-
-    Parameters
-    ----------
-    contact : matplotlib.lines.Line2D
-        A dot at the exact contact.
-    leader : matplotlib.lines.Line2D
-        From the contact to the circle.
-    circle : matplotlib.lines.Line2D
-        The finger, beside the object.
-    number : matplotlib.text.Text
-        Its number, in the circle.
-    """
-
-    contact: Line2D
-    leader: Line2D
-    circle: Line2D
-    number: Text
-
-
 @dataclass(frozen=True, eq=False, repr=False)
 class GraspArtists(Drawing):
     """What `plot_grasp` drew.
@@ -90,7 +73,7 @@ class GraspArtists(Drawing):
     fingers, released : mapping of int to FingerArtists
         The touching fingers, and the ghosts of released ones.
     cones : mapping of int to matplotlib.patches.Polygon
-        Friction cone of each supporting finger of three or more, within the object.
+        Friction cone of each supporting finger of three or more, as far as material goes.
     line : matplotlib.lines.Line2D or None
         Joins the contacts of two supporting fingers.
     arrows : mapping of int to matplotlib.patches.FancyArrowPatch
@@ -128,8 +111,8 @@ def plot_grasp(
     A finger is a numbered circle beside the object, joined to a dot at its contact: blue if it
     supports the object, white if it only touches, vermillion with a dark ring if highlighted, grey
     and hollow if just released. Three or more supporting fingers are drawn with their friction
-    cones, as far as these lie in the object, or with their common cone, in another colour; two are
-    joined by a dashed line.
+    cones, or with their common cone, in another colour, from the contact to where each direction
+    first leaves the object; two are joined by a dashed line.
 
     Parameters
     ----------
@@ -193,18 +176,18 @@ def plot_grasp(
     supporting = {k: now[k] for k in holding if cones}
     wedges, line = _draw_support(drawn, polygon, friction_cones, supporting, center)
     bands = {
-        k: draw_line(drawn.ax, np.stack([_at(polygon, end) for end in ends]), **BAND)
+        k: draw_line(drawn.ax, np.stack([point_of(polygon, end) for end in ends]), **BAND)
         for k, ends in (regions or {}).items()
     }
     moves = ((k, _draw_arrow(drawn.ax, polygon, frame, before[k], now[k])) for k in before)
     arrows = {k: arrow for k, arrow in moves if arrow is not None}
-    avoid = [_at(polygon, c) for c in (*now.values(), *gone.values(), *before.values())]
+    avoid = [point_of(polygon, c) for c in (*now.values(), *gone.values(), *before.values())]
     if line is not None:
         avoid += _points_along(line)
-    placed = _place_fingers(polygon, frame, [*now.values(), *gone.values()], avoid)
-    styles = [_style(k, holding, highlight) for k in now] + [_RELEASED] * len(gone)
+    placed = place_fingers(polygon, frame, [*now.values(), *gone.values()], avoid)
+    styles = [style_of(k, holding, highlight) for k in now] + [RELEASED] * len(gone)
     fingers = [
-        _draw_finger(drawn.ax, frame, finger, at, style)
+        draw_finger(drawn.ax, frame, finger, at, style)
         for finger, at, style in zip((*now, *gone), placed, styles, strict=True)
     ]
     if edge_numbers:
@@ -234,11 +217,6 @@ def _check_touching(what: str, fingers: Collection[int], touching: Mapping[int, 
             raise OptionError(f"{what} names finger {finger!r}, which does not touch: {names} do")
 
 
-def _at(polygon: Polygon, contact: Contact) -> FloatArray:
-    assert contact.fraction is not None
-    return polygon.points(contact.edge, contact.fraction)
-
-
 # --- what holds the object ----------------------------------------------------------------------
 
 
@@ -264,17 +242,17 @@ def _draw_support(
     holding: Mapping[int, Contact],
     center: int | None,
 ) -> tuple[dict[int, Wedge], Line2D | None]:
-    """Draw the line of two fingers, or the cones of any other number, as far as in the object."""
+    """Draw the line of two fingers, or the cones of any other number, as far as material goes."""
     if len(holding) == 2:
-        ends = np.stack([_at(polygon, contact) for contact in holding.values()])
+        ends = np.stack([point_of(polygon, contact) for contact in holding.values()])
         return {}, draw_line(drawn.ax, ends, **FORCE)
     rays, style = _cone_rays(cones, holding, center)
     wedges = {
-        k: pie(_at(polygon, c), rays[k], polygon.diameter, **style) for k, c in holding.items()
+        k: Wedge(visible_part(polygon, point_of(polygon, c), rays[k]), closed=True, **style)
+        for k, c in holding.items()
     }
     for wedge in wedges.values():
         drawn.ax.add_patch(wedge)
-        wedge.set_clip_path(drawn.fill.get_path(), drawn.ax.transData)
     return wedges, None
 
 
@@ -296,13 +274,6 @@ def pie(apex: FloatArray, rays: FloatArray, radius: float, **style: Any) -> Wedg
     return Wedge(np.vstack((apex, rim)), closed=True, **style)
 
 
-def draw_line(ax: Axes, points: FloatArray, **style: Any) -> Line2D:
-    """Draw points, shape (K, 2), joined by a line."""
-    line = Line2D(*points.T, **style)
-    ax.add_line(line)
-    return line
-
-
 def _points_along(line: Line2D) -> list[FloatArray]:
     """Return points on a line, close to each other, for labels to avoid."""
     first, last = np.asarray(line.get_xydata(), dtype=np.float64)
@@ -313,13 +284,13 @@ def _draw_arrow(
     ax: Axes, polygon: Polygon, frame: Frame, old: Contact, new: Contact
 ) -> FancyArrowPatch | None:
     """Draw the arrow of a slide, beside its edge; none if the finger stays where it is."""
-    to = _at(polygon, new)
+    to = point_of(polygon, new)
     assert old.fraction is not None
     assert new.fraction is not None
     if old.fraction == new.fraction:
         return None
     along = frame.directions(polygon.tangents[new.edge]) * np.sign(new.fraction - old.fraction)
-    length = float(np.hypot(*(frame.points(to) - frame.points(_at(polygon, old)))))
+    length = float(np.hypot(*(frame.points(to) - frame.points(point_of(polygon, old)))))
     tail = to - frame.lengths(along * max(length, _ARROW_LEAST))
     shift = -_ARROW_SHIFT * frame.directions(polygon.normals[new.edge])
     arrow = FancyArrowPatch(
@@ -336,81 +307,3 @@ def _draw_arrow(
     )
     ax.add_patch(arrow)
     return arrow
-
-
-# --- fingers ------------------------------------------------------------------------------------
-
-
-@dataclass(frozen=True)
-class _Style:
-    """Colours of circle, ring, number and contact; width of the ring; line of the leader."""
-
-    face: str
-    ring: str
-    number: str
-    contact: str
-    width: float = 1.0
-    line: str = "-"
-
-
-_SUPPORTING = _Style(palette.BLUE, palette.BLUE, "white", palette.BLUE)
-_TOUCHING = _Style("white", palette.BLUE, palette.BLUE, palette.BLUE)
-_MOVED = _Style(palette.VERMILLION, palette.INK, "white", palette.INK, 1.5)
-_RELEASED = _Style("white", palette.GREY, palette.GREY, "white", 1.0, ":")
-
-
-def _style(finger: int, holding: Collection[int], highlight: Collection[int]) -> _Style:
-    if finger in highlight:
-        return _MOVED
-    return _SUPPORTING if finger in holding else _TOUCHING
-
-
-def _place_fingers(
-    polygon: Polygon, frame: Frame, contacts: list[Contact], avoid: list[FloatArray]
-) -> list[Placed]:
-    """Places of the circles of fingers at the contacts."""
-    half = np.full(2, palette.FINGER_RADIUS)
-    labels = [
-        Label(
-            frame.points(_at(polygon, contact)),
-            -frame.directions(polygon.normals[contact.edge]),
-            half,
-            np.zeros(2),
-        )
-        for contact in contacts
-    ]
-    points = frame.points(np.reshape(avoid, (-1, 2)))
-    placed = place(paper_of(polygon, frame), labels, _SEARCH, avoid=points)
-    return [p for p in placed if p is not None]  # all: the search has no limit
-
-
-def _draw_finger(
-    ax: Axes, frame: Frame, finger: int, placed: Placed, style: _Style
-) -> FingerArtists:
-    at, to = frame.coordinates(placed.anchor), frame.coordinates(placed.center)
-    beside = shifted(ax, placed.center - placed.anchor)
-    ring: dict[str, Any] = {"markeredgecolor": style.ring, "linestyle": "none", "marker": "o"}
-    small = {"markersize": 3.6, "markerfacecolor": style.contact, "markeredgewidth": 0.8}
-    dot = draw_line(ax, at[None], zorder=palette.CONTACT_LAYER, **ring, **small)
-    thin: dict[str, Any] = {"color": style.ring, "linewidth": 0.9, "linestyle": style.line}
-    leader = draw_line(ax, np.stack((at, to)), zorder=palette.LEADER_LAYER, **thin)
-    large = {
-        "markersize": 2 * palette.FINGER_RADIUS,
-        "markerfacecolor": style.face,
-        "markeredgewidth": style.width,
-    }
-    circle = draw_line(ax, at[None], transform=beside, zorder=palette.FINGER_LAYER, **ring, **large)
-    size = palette.FINGER_FONT if finger < 10 else palette.FINGER_FONT - 2
-    number = ax.text(
-        at[0],
-        at[1],
-        str(finger),
-        transform=beside,
-        ha="center",
-        va="center_baseline",
-        fontsize=size,
-        fontweight="bold",
-        color=style.number,
-        zorder=palette.TEXT_LAYER,
-    )
-    return FingerArtists(dot, leader, circle, number)

@@ -72,9 +72,9 @@ def plot_polygon(
     The number of an edge stands beside it, near its middle, on the side away from the material;
     where there is no room it stands farther away, joined to the edge by a thin line. Numbers are
     placed from the longest edge to the shortest, and up to 60 are made smaller, to 70 %, if that
-    finds room for more. One for which no clear place is left is not written: those of its
-    neighbours tell it. A small circle marks where edge 0 starts; edges are numbered
-    counter-clockwise from there, then those of the holes, clockwise.
+    finds room for more, or for more beside their edges. One for which no clear place is left is
+    not written: those of its neighbours tell it. A small circle marks where edge 0 starts; edges
+    are numbered counter-clockwise from there, then those of the holes, clockwise.
 
     Parameters
     ----------
@@ -177,15 +177,25 @@ def _place_numbers(
     order = np.argsort(-polygon.edge_lengths, kind="stable").tolist()
     search, corner = _OF_FEW if few else _OF_MANY, frame.points(polygon.exterior[:1])
     chosen: tuple[float, dict[int, Placed]] = nominal, {}
+    most = 0, 0
     for font in (nominal, 0.85 * nominal, 0.7 * nominal) if few else (nominal,):
         labels = [Label(middles[i], outward[i], text_half(str(i), font), reach[i]) for i in order]
         placed = place(paper, labels, search, avoid=corner, taken=taken)
         found = {i: p for i, p in zip(order, placed, strict=True) if p is not None}
-        if len(found) > len(chosen[1]):
+        beside = sum(_leader_length(p)[1] < _LEADER_FROM for p in found.values())
+        if (len(found), beside) > most:
+            most = len(found), beside
             chosen = font, dict(sorted(found.items()))
-        if len(found) == polygon.n_edges:
+        if beside == polygon.n_edges:
             break
     return chosen
+
+
+def _leader_length(placed: Placed) -> tuple[float, float]:
+    """Part of the way to a number that is within its box, and the length of the rest."""
+    offset = placed.center - placed.anchor
+    inside = float(np.min(placed.half / np.maximum(np.abs(offset), 1e-9)))
+    return inside, (1 - inside) * float(np.hypot(*offset))
 
 
 def _draw_number(
@@ -197,12 +207,10 @@ def _draw_number(
     text = ax.text(
         x, y, str(edge), transform=shifted(ax, offset), color=INK, zorder=TEXT_LAYER, **style
     )
-    length = float(np.hypot(*offset))
-    # where the leader enters the box of the number
-    inside = float(np.min(placed.half / np.maximum(np.abs(offset), 1e-9)))
-    if (1 - inside) * length < _LEADER_FROM:
+    inside, length = _leader_length(placed)
+    if length < _LEADER_FROM:
         return text, None
-    to = at + frame.lengths(offset * (1 - inside - 1.0 / length))
+    to = at + frame.lengths(offset * (1 - inside - 1.0 / float(np.hypot(*offset))))
     leader = Line2D([x, to[0]], [y, to[1]], color=GREY, linewidth=0.5, zorder=LEADER_LAYER)
     ax.add_line(leader)
     return text, leader

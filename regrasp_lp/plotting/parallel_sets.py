@@ -22,8 +22,8 @@ from regrasp_lp.grasp_sets.collection import GraspSet
 from regrasp_lp.grasp_sets.sweeps import Sweeps
 from regrasp_lp.linear_sets import LinearSets
 from regrasp_lp.plotting import palette
-from regrasp_lp.plotting.frame import Drawing, check_drawable
-from regrasp_lp.plotting.grasps import FORCE, draw_line, pie
+from regrasp_lp.plotting.frame import Drawing, check_drawable, draw_line
+from regrasp_lp.plotting.grasps import FORCE, pie
 from regrasp_lp.plotting.scene import (
     CONE,
     DOT,

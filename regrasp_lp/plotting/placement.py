@@ -87,11 +87,12 @@ class Label:
 
 @dataclass(frozen=True, eq=False)
 class Placed:
-    """A label in its place: the point it names, its centre, half of its width and height."""
+    """A label in its place: the point it names, its centre, half of its size, what it costs."""
 
     anchor: FloatArray
     center: FloatArray
     half: FloatArray
+    cost: float = 0.0
 
 
 @dataclass(frozen=True)
@@ -179,7 +180,7 @@ def place(
             worst = max(worst, float(cost[best]))
             placed[i] = None
             if cost[best] < search.limit:
-                placed[i] = Placed(anchors[best], centers[best], label.half)
+                placed[i] = Placed(anchors[best], centers[best], label.half, float(cost[best]))
                 table[i] = anchors[best], centers[best], label.half
         if sweep and worst < CROSSING:
             break

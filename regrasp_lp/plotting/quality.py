@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, TypeAlias
 
 import numpy as np
 from matplotlib.axes import Axes
@@ -11,13 +11,24 @@ from matplotlib.collections import QuadMesh
 from matplotlib.colorbar import Colorbar
 from matplotlib.contour import QuadContourSet
 from matplotlib.lines import Line2D
+from matplotlib.patches import PathPatch
 from matplotlib.ticker import MaxNLocator
+from scipy.ndimage import distance_transform_edt
 
 from regrasp_lp.errors import OptionError
 from regrasp_lp.friction import FloatArray
 from regrasp_lp.plotting import palette
 from regrasp_lp.plotting.frame import POINTS_PER_INCH, Drawing, Frame, OwnFigure
-from regrasp_lp.plotting.scene import DOT, EDGE, Sign, around, draw_dot, set_scene
+from regrasp_lp.plotting.scene import (
+    DOT,
+    EDGE,
+    Sign,
+    around,
+    draw_dot,
+    draw_sets,
+    set_scene,
+    within,
+)
 from regrasp_lp.quality.maps import QualityMap
 
 _BAR, _BAR_GAP, _BAR_ROOM = 0.14, 0.12, 0.85  # of the scale beside the axes, in inches
@@ -25,7 +36,10 @@ _COLORS = "cividis"  # read alike with any kind of colour blindness, and in grey
 _LEVELS = 7
 _OUTSIDE: dict[str, Any] = {"facecolor": palette.MATERIAL, "hatch": "///", "edgecolor": "#CFCFCA"}
 _LINES: dict[str, Any] = {"colors": "white", "linewidths": 0.6, "alpha": 0.8}
+_CELL: dict[str, Any] = {"facecolor": "none", "edgecolor": "none"}
 _BEST: dict[str, Any] = {"markerfacecolor": "white", "marker": "*", "markersize": 12.0}
+
+MaskedValues: TypeAlias = "np.ma.MaskedArray[tuple[int, ...], np.dtype[np.float64]]"
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -35,18 +49,22 @@ class QualityMapArtists(Drawing):
     Parameters
     ----------
     mesh : matplotlib.collections.QuadMesh
-        A cell for each sample within the set.
+        A cell for each sample within the set; over a focus cell all samples are coloured, those
+        beyond the cell as the nearest one within, so that the colours end where the cell does.
     levels : matplotlib.contour.QuadContourSet or None
         Lines of equal values; None where the values are all alike.
     best : matplotlib.lines.Line2D
         The best of the samples.
     scale : matplotlib.colorbar.Colorbar
+    cell : matplotlib.patches.PathPatch or None
+        The focus cell, as far as it was sampled, which ends mesh and levels; None over contacts.
     """
 
     mesh: QuadMesh
     levels: QuadContourSet | None
     best: Line2D
     scale: Colorbar
+    cell: PathPatch | None = None
 
 
 def plot_quality_map(found: QualityMap, ax: Axes | None = None) -> QualityMapArtists:
@@ -54,7 +72,8 @@ def plot_quality_map(found: QualityMap, ax: Axes | None = None) -> QualityMapArt
 
     Samples within the set are coloured, the brighter the better, with lines of equal values; what
     is hatched is no grasp of the set. A star marks the best sample. Over a focus cell the map is
-    drawn on the object, with the edges of the set.
+    drawn on the object, with the edges of the set, and ends where the cell does, which may be
+    beyond the object. The title says what is mapped.
 
     Parameters
     ----------
@@ -85,8 +104,13 @@ def plot_quality_map(found: QualityMap, ax: Axes | None = None) -> QualityMapArt
             f"none of {found.values.size} samples is in the set: ask for more with samples=..., or "
             "fix another position"
         )
-    ax = _on_object(found, ax) if found.over == "focus" else _in_contact_space(found, ax)
     seen = np.ma.masked_where(~found.within | ~np.isfinite(found.values), found.values)
+    cell = None
+    if found.over == "focus":
+        ax, cell = _on_object(found, ax)
+        seen = _extended(found, seen)
+    else:
+        ax = _in_contact_space(found, ax)
     colors = _COLORS + "_r" * found.metric.less_is_better
     layer = palette.CELL_LAYER
     mesh = ax.pcolormesh(
@@ -98,23 +122,48 @@ def plot_quality_map(found: QualityMap, ax: Axes | None = None) -> QualityMapArt
         inner = ticks[(ticks > seen.min()) & (ticks < seen.max())]
         if len(inner):
             levels = ax.contour(found.x, found.y, seen, inner, zorder=layer + 0.1, **_LINES)
+    for artist in (mesh, levels) if cell is not None else ():
+        if artist is not None:
+            artist.set_clip_path(cell)
+    best = draw_dot(ax, _best_of(found), **_BEST)
+    return QualityMapArtists(ax, mesh, levels, best, _draw_scale(ax, found, mesh), cell)
+
+
+def _best_of(found: QualityMap) -> FloatArray:
+    assert found.best is not None
     row, column = found.best
-    best = draw_dot(ax, np.array([found.x[column], found.y[row]]), **_BEST)
-    return QualityMapArtists(ax, mesh, levels, best, _draw_scale(ax, found, mesh))
+    return np.array([found.x[column], found.y[row]])
 
 
-def _on_object(found: QualityMap, ax: Axes | None) -> Axes:
-    """Axes with the object and the edges of the set."""
+def _extended(found: QualityMap, seen: MaskedValues) -> MaskedValues:
+    """Values with those that are masked replaced by the nearest one that is not."""
+    masked = np.ma.getmaskarray(seen)
+    if masked.all():
+        return seen
+    steps = [float(at[1] - at[0]) for at in (found.y, found.x)]
+    nearest = distance_transform_edt(masked, steps, return_distances=False, return_indices=True)
+    return np.ma.masked_array(found.values[tuple(nearest)], mask=False)
+
+
+def _on_object(found: QualityMap, ax: Axes | None) -> tuple[Axes, PathPatch]:
+    """Axes with the object and the edges of the set, and the focus cell as far as it is sampled."""
     polygon = found.grasp_set.polygon
     view = around(polygon.bounds, np.stack((found.x[[0, -1]], found.y[[0, -1]]), axis=1))
     signs: list[Sign] = [
         Line2D([], [], **EDGE, label="edge of the set"),
         Line2D([], [], **{**DOT, **_BEST}, label="best sample"),
     ]
-    drawn = set_scene(polygon, found.grasp_set.edges, view, ax, signs).ax
+    avoid = [_best_of(found)]
+    scene = set_scene(polygon, found.grasp_set.edges, view, ax, signs, avoid=avoid)
     if ax is None:
-        _make_room(drawn)
-    return drawn
+        _make_room(scene.ax)
+    edges = ", ".join(map(str, found.grasp_set.edges))
+    title = f"{found.metric.name} over the focus cell of edges {edges}"
+    scene.ax.set_title(title, fontsize=9, loc="left", parse_math=False)
+    cell = found.grasp_set.focus_cell
+    assert cell is not None
+    window = np.array([found.x[0], found.y[0], found.x[-1], found.y[-1]])
+    return scene.ax, draw_sets(scene, within(cell, window), **_CELL)
 
 
 def _in_contact_space(found: QualityMap, ax: Axes | None) -> Axes:

@@ -23,8 +23,15 @@ from regrasp_lp.grasp_sets.focus import in_object
 from regrasp_lp.grasp_sets.sweeps import Sweeps
 from regrasp_lp.linear_sets import LinearSets
 from regrasp_lp.plotting import palette
-from regrasp_lp.plotting.frame import POINTS_PER_INCH, Drawing, Frame, fit, own_axes, shifted
-from regrasp_lp.plotting.grasps import draw_line
+from regrasp_lp.plotting.frame import (
+    POINTS_PER_INCH,
+    Drawing,
+    Frame,
+    draw_line,
+    fit,
+    own_axes,
+    shifted,
+)
 from regrasp_lp.plotting.outline import PolygonArtists, paper_of, plot_polygon, text_half
 from regrasp_lp.plotting.placement import Label, Search, place
 from regrasp_lp.polygon import Polygon

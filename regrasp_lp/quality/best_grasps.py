@@ -24,6 +24,8 @@ from regrasp_lp.lp import get_solver, maximise_margins
 from regrasp_lp.margins import existing_pieces
 from regrasp_lp.quality.epsilon_bounds import epsilon_bound
 from regrasp_lp.quality.metrics import Metric, metric_of
+from regrasp_lp.quality.stability import margin, tolerance
+from regrasp_lp.quality.wrenches import epsilon
 from regrasp_lp.torque import torque_functions
 
 _LATTICE = {2: 48, 3: 16}  # points along each edge at the start of a search
@@ -84,7 +86,8 @@ def best(
     BestGrasp
         Proved for "margin" and "tolerance", by linear programs. For all others found by a search,
         the same one whenever it is repeated, which may miss the best; that of "epsilon" comes
-        with a bound (some percent above it where ε is limited by torques).
+        with a bound (where ε is limited by torques some percent above it; far above it where edges
+        are thousands of times longer than the object is thick).
 
     Raises
     ------
@@ -103,11 +106,12 @@ def best(
     (0.408, 0.41)
     """
     chosen = metric_of(metric, options)
-    if chosen.name in ("margin", "tolerance") and not options:
-        measure: Measure = "margin" if chosen.name == "margin" else "tolerance"
+    # by function, not by name: one of the user's may have the same name
+    if chosen.function in (margin, tolerance) and not options:
+        measure: Measure = "margin" if chosen.function is margin else "tolerance"
         return _by_programs(grasp_set, chosen, measure)
     found = _by_search(grasp_set, chosen)
-    if chosen.name != "epsilon":
+    if chosen.function is not epsilon:
         return found
     forces, scale = options.get("forces", "sum"), options.get("torque_scale", "gyration")
     return replace(found, bound=epsilon_bound(grasp_set, found.value, forces, scale))
@@ -214,10 +218,10 @@ def _by_search(grasp_set: GraspSet, metric: Metric) -> BestGrasp:
 
 
 def _goodness(grasp_set: GraspSet, metric: Metric, fractions: FloatArray) -> FloatArray:
-    """How good grasps are, at fractions of segments; -inf outside the set."""
+    """How good grasps are, at fractions of segments; -inf outside the set, and for NaN."""
     of_edges = _of_edges(grasp_set, fractions)
     good = metric.goodness(values_of(grasp_set, metric, of_edges))
-    return np.where(inside(grasp_set, of_edges), good, -np.inf)
+    return np.where(inside(grasp_set, of_edges) & ~np.isnan(good), good, -np.inf)
 
 
 def _of_edges(grasp_set: GraspSet, fractions: FloatArray) -> FloatArray:

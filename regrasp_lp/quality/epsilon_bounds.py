@@ -37,8 +37,8 @@ def epsilon_bound(
     Returns
     -------
     float
-        At least `value`; more by a thousandth where the boxes that may be tried suffice for that,
-        else by some percent.
+        At least `value`; more by a thousandth where the boxes that may be tried suffice for that.
+        Else by some percent, or by whatever the boxes left are long: much, of very long edges.
     """
     scale = scale_of(grasp_set.polygon, torque_scale)
     m = len(grasp_set.edges)

@@ -51,6 +51,17 @@ class QualityMap:
         The grasps.
     fixed : mapping of str to float
         The positions that are the same everywhere.
+
+    Examples
+    --------
+    >>> import regrasp_lp as rl
+    >>> block = rl.Polygon([(0, 0), (6, 0), (6, 3), (0, 3)])
+    >>> pair = rl.build_switching_graph(block, friction=0.4).sets[0]
+    >>> found = rl.quality.quality_map(pair, "margin", samples=5)
+    >>> found.names, found.values.shape, int(found.within.sum()), found.best
+    (('u0', 'u2'), (5, 5), 5, (2, 2))
+    >>> found.grasp(2, 2)
+    Grasp.at_fractions([(0, 0.5), (2, 0.5)])
     """
 
     grasp_set: GraspSet
@@ -83,8 +94,11 @@ class QualityMap:
         """
         if not self.within.any():
             return None
-        good = np.where(self.within, self.metric.goodness(self.values), -np.inf)
-        equal = np.argwhere(good >= good.max() - _EQUAL * abs(float(good.max())))
+        known = self.within & ~np.isnan(self.values)
+        good = np.where(known, self.metric.goodness(self.values), -np.inf)
+        most = float(good.max())
+        slack = _EQUAL * abs(most) if np.isfinite(most) else 0.0
+        equal = np.argwhere(self.within & (good >= most - slack))
         away = equal - equal.mean(axis=0)
         row, column = equal[(away**2).sum(axis=1).argmin()].tolist()
         return row, column

@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
+import inspect
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import Any
 
 import numpy as np
@@ -64,6 +65,9 @@ class Metric:
         return -values if self.less_is_better else values
 
 
+_GIVEN = ("polygon", "grasp", "friction", "edges", "positions", "fractions")
+"""Arguments that say which grasps; the others of a metric are its options."""
+
 _METRICS = (
     Metric("margin", margin, unit="length"),
     Metric("tolerance", tolerance, unit="length"),
@@ -90,12 +94,23 @@ def metric_of(metric: str | Callable[..., Any], options: Mapping[str, Any]) -> M
     Raises
     ------
     OptionError
-        If there is none of that name.
+        If there is none of that name, or it has no such argument.
     """
     for known in _METRICS:
         if metric in (known.name, known.function):
-            return Metric(known.name, known.function, known.less_is_better, known.unit, options)
+            _check_options(known, options)
+            return replace(known, options=options)
     if callable(metric):
         return Metric(getattr(metric, "__name__", "metric"), metric, options=options)
     names = ", ".join(f'"{known.name}"' for known in _METRICS)
     raise OptionError(f"metric must be a function or one of {names}, got {metric!r}")
+
+
+def _check_options(metric: Metric, options: Mapping[str, Any]) -> None:
+    """Refuse arguments that a metric of ours does not have, or that the caller gives it."""
+    parameters = inspect.signature(metric.function).parameters
+    listed = [name for name in parameters if name not in _GIVEN]
+    for name in options:
+        if name not in listed:
+            offered = f"its options are {', '.join(listed)}" if listed else "it has no options"
+            raise OptionError(f"the metric {metric.name} has no option {name!r}: {offered}")

@@ -50,6 +50,15 @@ class LargestRegions:
         What was maximised: the least width of a region, or the sum of all widths.
     bound : float
         No regions of any grasp are wider: from the multipliers of the programs.
+
+    Examples
+    --------
+    >>> block = Polygon([(0, 0), (6, 0), (6, 3), (0, 3)])
+    >>> found = largest_regions(block, friction=0.4)
+    >>> found.grasp.edges.tolist(), (found.regions.round(6) + 0.0).tolist()
+    ([0, 0, 2], [[0.0, 2.8], [3.2, 6.0], [1.6, 4.4]])
+    >>> round(found.width, 6), found.gap < 1e-9
+    (2.8, True)
     """
 
     polygon: Polygon
@@ -163,6 +172,8 @@ def _candidates(
         for m in (2, 3) if contacts is None else (contacts,):
             yield complete_candidates(cones, m)
         return
+    if isinstance(edges, str) or not isinstance(edges, Iterable):
+        raise OptionError(f"edges has to be a list of two or three edges, not {edges!r}")
     chosen = sorted(polygon.resolve([(edge, 0.0) for edge in edges]).edges.tolist())
     if len(chosen) not in (2, 3) or contacts not in (None, len(chosen)):
         raise OptionError(f"edges are those of 2 or 3 contacts, as `contacts` says, got {chosen}")

@@ -4,7 +4,8 @@ Which triangles are faces of the convex hull of points, and which parallelograms
 sum of two triangles, is read off points that are moved a little, each in a direction of its own:
 then no four of them are in a plane, and each face is found once. Volumes are those of the points as
 they are. Where points are nearly in a plane another triangulation than theirs may be measured: what
-that makes is a billionth of the size of the hull.
+that makes is a billionth of the size of the hull. Forces and torques are moved each in proportion
+to themselves, so that nothing depends on how torques are scaled.
 """
 
 from __future__ import annotations
@@ -17,7 +18,7 @@ from regrasp_lp.friction import FloatArray
 from regrasp_lp.quality.hulls import triples
 
 _APART = 1e-9
-"""Of their size: by how much points are moved."""
+"""Of the largest of each of their coordinates: by how much points are moved."""
 
 _SIDES = ((0, 1, 2), (0, 2, 1), (1, 2, 0))
 """The two ends of each side of a triangle, and the corner that is not on it."""
@@ -101,4 +102,4 @@ def _mixed(one: FloatArray, others: FloatArray, moved: FloatArray) -> FloatArray
 def _moved(points: FloatArray) -> FloatArray:
     """The points, each moved a little along a direction of its own."""
     ways = np.cos(np.outer(np.arange(1, points.shape[1] + 1), np.sqrt([2.0, 3.0, 5.0])))
-    return np.asarray(points + _APART * np.abs(points).max(axis=(1, 2), keepdims=True) * ways)
+    return np.asarray(points + _APART * np.abs(points).max(axis=1, keepdims=True) * ways)

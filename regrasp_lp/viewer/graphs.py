@@ -53,6 +53,14 @@ def graph_page(graph: SwitchingGraph, path: str | Path | None = None) -> str:
     ------
     OptionError
         If the graph has more than a million switches to list.
+
+    Examples
+    --------
+    >>> import regrasp_lp as rl
+    >>> block = rl.Polygon([(0, 0), (6, 0), (6, 3), (0, 3)], name="block")
+    >>> page = graph_page(rl.build_switching_graph(block, friction=0.4))    # or graph.to_html(path)
+    >>> page[:15], len(page) < 100_000
+    ('<!doctype html>', True)
     """
     document = graph_document(graph)
     page = build_page("graph", document["title"], document, {"summary": str(graph.summary())})

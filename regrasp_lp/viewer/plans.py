@@ -16,7 +16,7 @@ import numpy as np
 from regrasp_lp.colors import KIND_NAMES
 from regrasp_lp.contact import Contact
 from regrasp_lp.grasp_sets.candidates import common_cone
-from regrasp_lp.planning.account import describe
+from regrasp_lp.planning.account import describe, end, head
 from regrasp_lp.planning.regions import Region, regions, touchable_part
 from regrasp_lp.planning.steps import Place, Release, Slide
 from regrasp_lp.viewer.page import build_page, finite, object_of, save_page
@@ -112,6 +112,15 @@ def plan_page(plan: Plan, path: str | Path | None = None) -> str:
     -------
     str
         HTML with all that it needs.
+
+    Examples
+    --------
+    >>> import regrasp_lp as rl
+    >>> block = rl.Polygon([(0, 0), (6, 0), (6, 3), (0, 3)], name="block")
+    >>> plan = rl.plan_regrasp(block, [(0, 3), (2, 3)], [(1, 1.5), (3, 1.5)], friction=0.4)
+    >>> page = plan_page(plan)                    # or plan.to_html("block.html")
+    >>> page[:15], "<title>Regrasp of block</title>" in page
+    ('<!doctype html>', True)
     """
     document = plan_document(plan)
     page = build_page("plan", document["title"], document, {"account": str(plan)})
@@ -135,8 +144,6 @@ def plan_document(plan: Plan) -> dict[str, Any]:
     found = regions(plan) if plan.margin > 0 else ()
     at_rest = {region.step: region for region in found if not region.on_the_way}
     moving = {region.step: region for region in found if region.on_the_way}
-    # The account is a head, a table and an end; the table is what the page is about.
-    head, _, end = str(plan).split("\n\n")
     name = plan.polygon.name or "unnamed polygon"
     return {
         "title": f"Regrasp of {name}",
@@ -147,11 +154,20 @@ def plan_document(plan: Plan) -> dict[str, Any]:
         "placements": plan.placements,
         "margin": finite(plan.margin),
         "tolerance": finite(plan.tolerance),
-        "head": head.splitlines()[1:],
-        "end": end,
+        "chosen": _chosen(plan),
+        # of the account; its table is what the page is about
+        "head": head(plan),
+        "end": "\n".join(end(plan)),
         "moments": [asdict(_moment(plan, grasp, at_rest)) for grasp in plan.grasps],
         "transitions": [asdict(_transition(plan, i, moving)) for i in range(len(plan.steps))],
     }
+
+
+def _chosen(plan: Plan) -> dict[str, float | None] | None:
+    """The least margin and tolerance without start and goal; None if nothing was chosen."""
+    if plan.chosen_margin == float("inf"):
+        return None
+    return {"margin": finite(plan.chosen_margin), "tolerance": finite(plan.chosen_tolerance)}
 
 
 def _moment(plan: Plan, grasp: HeldGrasp, found: Mapping[int, Region]) -> Moment:

@@ -2,7 +2,7 @@
 // contacts. What is not in the data is computed from the torque functions of a set.
 
 const outline = new Outline(DATA.object);
-const show = { cones: true, regions: true, focus: true, edges: false };
+const show = { cones: true, regions: true, focus: true, edges: outline.edges.length <= 30 };
 
 // --- the data ---
 
@@ -257,7 +257,7 @@ class Heap {
 
 // --- what is chosen ---
 
-const state = { from: null, to: null, way: null, at: 0, grasp: null, piece: -1, cursor: null };
+const state = { from: null, to: null, way: null, at: 0, grasp: null, piece: -1, cursor: null, hovered: null };
 const filter = { kinds: new Set(DATA.kinds.map((_, k) => k)), edges: [], least: -Infinity };
 const passes = (i) => filter.kinds.has(kindOf[i]) && margins[i] >= filter.least && filter.edges.every((e) => edgesOf(i).includes(e));
 
@@ -272,6 +272,7 @@ function select(from, to = null) {
   state.grasp = from === null ? null : witnessOf(from);
   byId("from").value = from ?? "";
   byId("to").value = to ?? "";
+  byId("refused").textContent = "";
   if (from !== null) state.cursor = to ?? from;
   describe();
   render();
@@ -290,10 +291,11 @@ const bounds = [0, 1].map((axis) => {
 });
 let camera = { scale: 1, x: 0, y: 0 }, pixels = [0, 0], ratio = 1, busy = 0, colors = {};
 
+const BORDER = 20, BUTTONS = 44;  // around the points, and for the buttons on the right of them
+
 function fit() {
-  const extent = bounds.map(([low, high]) => Math.max(high - low, 1e-9));
-  const scale = Math.min((pixels[0] - 40) / extent[0], (pixels[1] - 40) / extent[1]);
-  camera = { scale, x: pixels[0] / 2 - scale * (bounds[0][0] + bounds[0][1]) / 2, y: pixels[1] / 2 + scale * (bounds[1][0] + bounds[1][1]) / 2 };
+  const scale = baseScale(), middle = (pixels[0] - BUTTONS) / 2;
+  camera = { scale, x: middle - scale * (bounds[0][0] + bounds[0][1]) / 2, y: pixels[1] / 2 + scale * (bounds[1][0] + bounds[1][1]) / 2 };
 }
 
 const onMap = (i) => [camera.x + camera.scale * positions[2 * i], camera.y - camera.scale * positions[2 * i + 1]];
@@ -301,7 +303,8 @@ const onMap = (i) => [camera.x + camera.scale * positions[2 * i], camera.y - cam
 function measure() {
   ratio = devicePixelRatio || 1;
   const width = canvas.parentElement.clientWidth, aspect = (bounds[1][1] - bounds[1][0]) / Math.max(bounds[0][1] - bounds[0][0], 1e-9);
-  const height = Math.max(240, Math.min(width * Math.max(0.55, aspect), innerHeight * 0.62));
+  const wanted = Math.min(width * Math.max(0.55, aspect), innerHeight * 0.62);
+  const height = Math.max(240, seenWhole() ? roomFor(canvas, byId(byId("refused").textContent ? "choice" : "hint")) : wanted);
   canvas.style.height = `${height}px`;
   canvas.width = Math.round(width * ratio);
   canvas.height = Math.round(height * ratio);
@@ -335,12 +338,14 @@ function paint() {
     strokePairs(state.way.sets.slice(1).map((j, n) => [state.way.sets[n], j]), colors.vermillion, 1, 3);
     state.way.sets.forEach((i) => mark(i, radius() + 2, kindColors()[kind(i).name]));
   }
-  for (const [i, name] of [[state.from, "from"], [state.to, "to"]]) if (i !== null) flag(i, name);
+  numbers(seen);
+  for (const [i, name] of [[state.from, "from"], [state.to, "to"]]) if (i !== null) flag(i, state.to === null ? `set ${i}` : `${name} ${i}`);
+  if (state.hovered !== null) flag(state.hovered, `set ${state.hovered}: edges ${edgesOf(state.hovered).join(", ")}`);
   if (document.activeElement === canvas && state.cursor !== null) ring(state.cursor, radius() + 6, colors.ink);
 }
 
 const radius = () => Math.max(2, Math.min(7, 0.35 * Math.sqrt(pixels[0] * pixels[1] / Math.max(N, 1)) * Math.sqrt(camera.scale / baseScale())));
-const baseScale = () => Math.min((pixels[0] - 40) / Math.max(bounds[0][1] - bounds[0][0], 1e-9), (pixels[1] - 40) / Math.max(bounds[1][1] - bounds[1][0], 1e-9));
+const baseScale = () => Math.min(...[pixels[0] - BUTTONS, pixels[1]].map((side, axis) => (side - 2 * BORDER) / Math.max(bounds[axis][1] - bounds[axis][0], 1e-9)));
 
 function strokePairs(pairs, color, alpha, width) {
   context.globalAlpha = alpha;
@@ -412,11 +417,44 @@ function ring(i, r, color) {
   context.stroke();
 }
 
-function flag(i, name) {
-  const [x, y] = onMap(i), words = state.to === null ? `set ${i}` : `${name} ${i}`;
+const NUMBERED = 60;  // so many points in view have their numbers beside them
+
+// Beside each point, where it covers neither a point nor another number.
+function numbers(seen) {
+  const inView = [];
+  for (let i = 0; i < N && inView.length <= NUMBERED; i += 1) {
+    const [x, y] = onMap(i);
+    if (seen[i] && x > 0 && y > 0 && x < pixels[0] && y < pixels[1]) inView.push(i);
+  }
+  if (inView.length > NUMBERED) return;
+  const r = 1.2 * radius(), taken = inView.map((i) => [...onMap(i), r, r]);
+  context.font = "11px system-ui, sans-serif";
+  context.textAlign = "center";
+  context.strokeStyle = colors.paper;
+  context.fillStyle = colors.ink;
+  context.lineWidth = 3;
+  const flagged = [state.from, state.to, state.hovered];
+  for (const i of inView) {
+    if (flagged.includes(i)) continue;
+    const [x, y] = onMap(i), half = [context.measureText(i).width / 2 + 1, 5.5];
+    const place = BESIDE.map(([dx, dy]) => [x + dx * (r + half[0] + 1), y + dy * (r + half[1] + 1), ...half])
+      .find((box) => box[0] > half[0] && box[0] < pixels[0] - half[0] && box[1] > half[1] && box[1] < pixels[1] - half[1]
+        && taken.every((other) => Math.abs(box[0] - other[0]) > half[0] + other[2] || Math.abs(box[1] - other[1]) > half[1] + other[3]));
+    if (!place) continue;  // it is told where one points at it
+    taken.push(place);
+    context.strokeText(i, place[0], place[1] + 4);
+    context.fillText(i, place[0], place[1] + 4);
+  }
+  context.textAlign = "start";
+}
+
+const BESIDE = [[1, 0], [-1, 0], [0, -1], [0, 1], [0.8, -0.8], [-0.8, -0.8], [0.8, 0.8], [-0.8, 0.8]];
+
+function flag(i, words) {
+  const [x, y] = onMap(i);
   mark(i, radius() + 3, kindColors()[kind(i).name]);
   context.font = "600 13px system-ui, sans-serif";
-  const width = context.measureText(words).width, left = Math.max(2, Math.min(pixels[0] - width - 12, x + 10)), top = Math.max(2, y - 26);
+  const width = context.measureText(words).width, left = Math.max(2, Math.min(pixels[0] - BUTTONS - width - 12, x + 10)), top = Math.max(2, y - 26);
   context.fillStyle = colors.ink;
   context.fillRect(left, top, width + 10, 19);
   context.fillStyle = colors.paper;
@@ -445,6 +483,12 @@ function moving() {
   render();
 }
 
+function hover(i) {
+  if (state.hovered === i) return;
+  state.hovered = i;
+  render();
+}
+
 const held = new Map();
 let dragged = 0;
 const placeOf = (event) => { const box = canvas.getBoundingClientRect(); return [event.clientX - box.left, event.clientY - box.top]; };
@@ -455,7 +499,10 @@ canvas.addEventListener("pointerdown", (event) => {
   if (held.size === 1) dragged = 0;
 });
 canvas.addEventListener("pointermove", (event) => {
-  if (!held.has(event.pointerId)) return;
+  if (!held.has(event.pointerId)) {
+    hover(nearest(placeOf(event), 12));
+    return;
+  }
   const old = held.get(event.pointerId), now = placeOf(event);
   const [other] = [...held].filter(([id]) => id !== event.pointerId).map(([, at]) => at);
   const gap = (p, q) => Math.hypot(p[0] - q[0], p[1] - q[1]);
@@ -470,6 +517,7 @@ canvas.addEventListener("pointerup", (event) => {
   const found = nearest(placeOf(event), event.pointerType === "touch" ? 24 : 12);
   if (found !== null) choose(found);
 });
+canvas.addEventListener("pointerleave", () => hover(null));
 canvas.addEventListener("pointercancel", (event) => held.delete(event.pointerId));
 canvas.addEventListener("wheel", (event) => { event.preventDefault(); zoom(Math.exp(-0.0015 * event.deltaY), placeOf(event)); }, { passive: false });
 canvas.addEventListener("focus", render);
@@ -566,7 +614,7 @@ function refresh(i) {
   });
   const margin = marginOf(i, state.grasp);
   byId("now").replaceChildren(make("b", {}, margin > 0 ? `margin ${text(margin)}` : `no grasp of this set (margin ${text(margin)})`),
-    ` · best of the set ${text(margins[i])}${nComponents > 1 ? ` · component ${components[i] + 1} of ${nComponents}` : ""}${DATA.spaced ? " · limits to the distance between fingers are not looked at here" : ""}`);
+    ` · best of the set ${text(margins[i])}${nComponents > 1 ? ` · component ${components[i] + 1} of ${nComponents}` : ""}${DATA.spaced ? " · limits that tie fingers to each other are not looked at here" : ""}`);
   picture();
 }
 
@@ -618,7 +666,7 @@ function picture() {
 
 function sceneOf() {
   const { from, to, way, at } = state;
-  if (from === null || (to !== null && !way)) return { contacts: {}, support: [], regions: {}, rays: {}, show: { ...show, edges: true } };
+  if (from === null || (to !== null && !way)) return { contacts: {}, support: [], regions: {}, rays: {}, show };
   if (to === null) {
     const scene = graspScene(from, state.grasp), spans = shownIntervals(from);
     scene.wide = spans ? Object.fromEntries(spans.map((span, c) => [letters[c], span])) : {};
@@ -682,9 +730,19 @@ function kindBoxes() {
 }
 
 function typed() {
-  const number = (id) => { const value = byId(id).value.trim(); return value && Number(value) >= 0 && Number(value) < N ? Math.floor(Number(value)) : null; };
-  const [from, to] = [number("from"), number("to")];
-  select(from, from === to || from === null ? null : to);
+  const numbers = ["from", "to"].map((id) => byId(id).value.trim());
+  const refused = refusal(numbers);
+  if (refused) byId("refused").textContent = refused;  // what is typed stays, and what is chosen
+  else select(...numbers.map((number) => (number === "" ? null : Number(number))));
+}
+
+// What is wrong with the numbers of two sets as they were typed; nothing is an empty text.
+function refusal([from, to]) {
+  if (["from", "to"].some((id) => byId(id).validity.badInput)) return "That is not the number of a set.";
+  const unknown = [from, to].find((number) => number !== "" && !(/^\d+$/.test(number) && Number(number) < N));
+  if (unknown !== undefined) return N ? `There is no set ${unknown}: they are numbered from 0 to ${N - 1}.` : "There are no sets.";
+  if (from === "" && to !== "") return "Type the number of the first set, too.";
+  return from !== "" && Number(from) === Number(to) && to !== "" ? "These two are the same set." : "";
 }
 
 function resized() {
@@ -709,12 +767,11 @@ byId("zoom-out").addEventListener("click", () => zoom(1 / 1.5));
 byId("zoom-all").addEventListener("click", () => { fit(); render(); });
 kindBoxes();
 layerBoxes([["cones", "cone", "friction cones"], ["regions", "region", "where it may be (wide: in the set; narrow: as the others are)"],
-  ["focus", "focus", "focus points"], ["edges", null, "edge numbers"]],
-  [...(DATA.kinds.some((one) => one.cell) ? [["cell", "focus cell"]] : []), ["dot supports", "contact"], ["dot moved", "placed"], ["dot released", "let go"]], show, picture);
+  ["focus", "focus", "focus points", ...(DATA.kinds.some((one) => one.cell) ? ["cell", "focus cell"] : [])], ["edges", null, "edge numbers"]],
+  [["dot supports", "contact"], ["dot moved", "placed"], ["dot released", "let go"]], show, picture);
 select(null, null);
 resized();
-let lastWidth = innerWidth;
-addEventListener("resize", () => { if (innerWidth !== lastWidth) { lastWidth = innerWidth; resized(); } });
+onResize(resized);
 matchMedia("(prefers-color-scheme: dark)").addEventListener("change", () => { measure(); render(); });
 
 // For whoever looks under the hood, and for tests.

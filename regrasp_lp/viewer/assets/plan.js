@@ -100,11 +100,23 @@ let view = null, labels = [];
 
 function resized() {
   const svg = byId("picture"), width = svg.clientWidth || svg.parentElement.clientWidth;
-  view = new View(outline, width, Math.max(220, Math.min(0.56 * innerHeight, width)));
+  CHART.height = innerHeight < 700 ? 90 : 120;
+  drawChart();
+  reserveWords();
+  const room = roomFor(svg, seenWhole() ? byId("layers") : byId("curves"));
+  view = new View(outline, width, Math.max(seenWhole() ? 150 : 220, Math.min(room, width)));
   svg.setAttribute("height", view.height);
   labels = [];
-  drawChart();
   update();
+}
+
+// As much room as the longest words take, so that nothing below them jumps.
+function reserveWords() {
+  const now = byId("now");
+  now.setAttribute("aria-live", "off");
+  now.style.minHeight = "";
+  const heights = moments.flatMap((_, i) => [i, Math.min(i + 0.5, END)]).map((t) => (sayInstant(t), now.offsetHeight));
+  now.style.minHeight = `${Math.max(...heights)}px`;
 }
 
 // Circles have their places at moments; in between they go from one place to the next.
@@ -139,7 +151,11 @@ function update() {
   }
   // what changes with every frame is not read out
   byId("now").setAttribute("aria-live", Number.isInteger(time) ? "polite" : "off");
-  const words = describeInstant();
+  sayInstant(time);
+}
+
+function sayInstant(t) {
+  const words = describeInstant(t);
   if (byId("now").textContent !== words.join("")) byId("now").replaceChildren(make("b", {}, words[0]), make("br"), make("small", {}, words[1]));
 }
 
@@ -151,14 +167,14 @@ function intoView(button) {
   }
 }
 
-function describeInstant() {
-  const i = Math.floor(time);
-  if (time === i) {
+function describeInstant(t) {
+  const i = Math.floor(t);
+  if (t === i) {
     const moment = moments[i];
     return [`${i}. ${stepText(i)}${i === END ? " – goal" : ""}`, `held by ${moment.support.join(", ")} (${moment.kind}), margin ${text(moment.margin)}, tolerance ${text(moment.tolerance)}`];
   }
   const base = moments[transitions[i].action === "release" ? i + 1 : i];
-  return [`${i + 1}. ${stepText(i + 1)} …`, `held by ${base.support.join(", ")} (${base.kind}), margin ${text(marginAt(time), 3)} now`];
+  return [`${i + 1}. ${stepText(i + 1)} …`, `held by ${base.support.join(", ")} (${base.kind}), now margin ${text(marginAt(t))}, tolerance ${text(toleranceAt(t))}`];
 }
 
 const stepText = (i) => (i ? transitions[i - 1].text
@@ -351,7 +367,8 @@ function signs() {
   const layers = [];
   layers.push(["cones", has((m) => m.parallel) && !has((m) => !m.parallel) ? "common" : "cone", "friction cones"]);
   layers.push(["regions", "region", "where it may be"]);
-  if (has((m) => !m.parallel)) layers.push(["focus", "focus", "focus points"]);
+  const cells = has((m) => m.kind === "concurrent" || m.kind === "two-finger") ? ["cell", "focus cell"] : [];
+  if (has((m) => !m.parallel)) layers.push(["focus", "focus", "focus points", ...cells]);
   layers.push(["edges", null, "edge numbers"]);
   const keys = [["dot supports", "supports the object"]];
   if (has((m, i) => Object.keys(m.contacts).some((k) => !m.support.includes(Number(k))))) keys.push(["dot touches", "only touches"]);
@@ -359,7 +376,6 @@ function signs() {
   if (transitions.some((t) => t.action === "release")) keys.push(["dot released", "just released"]);
   if (has((m) => m.support.length === 2)) keys.push(["force", "two-finger grasp"]);
   if (has((m) => m.parallel) && has((m) => !m.parallel)) keys.push(["common", "common cone"]);
-  if (has((m) => m.kind === "concurrent" || m.kind === "two-finger")) keys.push(["cell", "focus cell"]);
   layerBoxes(layers, keys, show, update);
 }
 
@@ -375,7 +391,8 @@ function filmstrip() {
 }
 
 byId("facts").textContent = [counted(END, "step"), counted(DATA.placements, "placement"), counted(DATA.fingers, "finger"),
-  `least margin ${text(DATA.margin)}`, `least tolerance ${text(DATA.tolerance)}`].join(" · ");
+  `least margin ${text(DATA.margin)}`, `least tolerance ${text(DATA.tolerance)}`,
+  ...(DATA.chosen ? [`without start and goal, which are given: ${text(DATA.chosen.margin)} and ${text(DATA.chosen.tolerance)}`] : [])].join(" · ");
 byId("time").max = END;
 byId("time").addEventListener("input", () => {
   // near a moment the moment itself is meant
@@ -399,9 +416,8 @@ signs();
 resized();
 filmstrip();
 addEventListener("beforeprint", filmstrip);
-let lastWidth = innerWidth;
-addEventListener("resize", () => { if (innerWidth !== lastWidth) { lastWidth = innerWidth; resized(); } });
+onResize(resized);
 
 // For whoever looks under the hood, and for tests.
-globalThis.regrasp = { go, play, sceneAt, marginAt, toleranceAt, outline, focusRegions, focusParts,
+globalThis.regrasp = { go, play, sceneAt, marginAt, toleranceAt, outline, focusRegions, focusParts, visiblePart,
   get time() { return time; }, get playing() { return playing; }, get view() { return view; } };

@@ -37,6 +37,7 @@ function dressed(element, attributes, children) {
 
 const add = (p, q, s = 1) => [p[0] + s * q[0], p[1] + s * q[1]];
 const cross = (p, q) => p[0] * q[1] - p[1] * q[0];
+const unit = (p) => [p[0] / Math.hypot(...p), p[1] / Math.hypot(...p)];
 const mix = (a, b, s) => a + s * (b - a);
 const mixed = (p, q, s) => [mix(p[0], q[0], s), mix(p[1], q[1], s)];
 
@@ -120,6 +121,43 @@ function focusRegions(parts, box, balanced = false) {
   return found;
 }
 
+// --- cones ---
+
+// The part of a cone that is seen from its apex through material: every direction up to where it
+// first leaves the object. Directions to vertices cut it into sectors, each of which sees one edge.
+function visiblePart(outline, apex, [right, left]) {
+  const segments = outline.edges.map(({ start, end }) => [add(start, apex, -1), add(end, apex, -1)]);
+  const ahead = add(unit(right), unit(left));
+  const turn = (v) => cross(ahead, v) / (ahead[0] * v[0] + ahead[1] * v[1]);
+  const corners = segments.map(([v]) => v).filter((v) => cross(right, v) > 0 && cross(v, left) > 0);
+  const directions = [right, ...corners.sort((v, w) => turn(v) - turn(w)), left].map(unit);
+  const ring = [apex];
+  for (let n = 1; n < directions.length; n += 1) {
+    const sector = [directions[n - 1], directions[n]];
+    const edge = seenEdge(segments, unit(add(...sector)), 1e-9 * outline.size);
+    ring.push(...(edge ? sector.map((ray) => add(apex, meetingPoint(edge, ray))) : [apex]));
+  }
+  return ring;
+}
+
+// The first segment that a ray from 0 meets; none if it does not begin in material.
+function seenEdge(segments, ray, near) {
+  let nearest = Infinity, seen = null, count = 0;
+  for (const [p, q] of segments) {
+    if (cross(ray, p) * cross(ray, q) >= 0) continue;
+    const away = cross(p, q) / cross(ray, add(q, p, -1));
+    if (away <= near) continue;
+    count += 1;
+    if (away < nearest) { nearest = away; seen = [p, q]; }
+  }
+  return count % 2 ? seen : null;
+}
+
+function meetingPoint([p, q], ray) {
+  const across = cross(ray, add(q, p, -1));
+  return mixed(p, q, across ? Math.max(0, Math.min(1, -cross(ray, p) / across)) : 0);
+}
+
 // --- where the object is on the page ---
 
 class View {
@@ -172,34 +210,54 @@ class View {
 
 // --- where to write ---
 
-const TURNS = [0, 20, -20, 40, -40, 60, -60, 80, -80, 110, -110, 145, -145];
-const AWAY = [0, 6, 12, 20, 30, 42];
+// Less than a quarter turn: a finger comes from where there is no material.
+const TURNS = [0, 12, -12, 24, -24, 36, -36, 48, -48, 60, -60, 72, -72, 84, -84];
+const AWAY = [0, 6, 12, 20, 30, 42, 58, 78, 104, 134];
+const EASY = 12;  // what a place costs, at most, near its contact and off all others
 
 // Offsets from contacts to the circles of their fingers: off the object, off each other, on the
-// page, near their contacts. Each in turn at its cheapest place, then once more around.
+// page, near their contacts. Where they are crowded each in its turn is the first one to choose,
+// for in a hole there may be room for one alone.
 function placeLabels(view, contacts) {
   const fingers = Object.keys(contacts);
   const anchors = Object.fromEntries(fingers.map((k) => [k, view.to(view.outline.at(contacts[k]))]));
-  const placed = {};
-  for (let sweepNumber = 0; sweepNumber < 3; sweepNumber += 1) {
-    for (const k of fingers) {
-      let best = Infinity;
-      const outward = view.outward(contacts[k][0]), anchor = anchors[k];
-      for (const away of AWAY) {
-        for (const turn of TURNS) {
-          const [c, s] = [Math.cos(turn * Math.PI / 180), Math.sin(turn * Math.PI / 180)];
-          const direction = [c * outward[0] - s * outward[1], s * outward[0] + c * outward[1]];
-          const offset = [0, 1].map((i) => direction[i] * (2 * FINGER + away));
-          const cost = away + 0.12 * Math.abs(turn) + labelCost(view, k, anchor, offset, anchors, placed);
-          if (cost < best) { best = cost; placed[k] = offset; }
-        }
+  const places = Object.fromEntries(fingers.map((k) => [k, placesFor(view, contacts[k][0], anchors[k])]));
+  let least = Infinity, found = {};
+  for (let n = 0; n < Math.min(fingers.length, 6) && least > EASY * fingers.length; n += 1) {
+    const [cost, placed] = settled([...fingers.slice(n), ...fingers.slice(0, n)], anchors, places);
+    if (cost < least) { least = cost; found = placed; }
+  }
+  return found;
+}
+
+// Where a circle may be, each place with what it costs by itself.
+function placesFor(view, edge, anchor) {
+  const outward = view.outward(edge);
+  return AWAY.flatMap((away) => TURNS.map((turn) => {
+    const [c, s] = [Math.cos(turn * Math.PI / 180), Math.sin(turn * Math.PI / 180)];
+    const direction = [c * outward[0] - s * outward[1], s * outward[0] + c * outward[1]];
+    const offset = [0, 1].map((i) => direction[i] * (2 * FINGER + away));
+    return { offset, cost: away + 0.12 * Math.abs(turn) + costAlone(view, anchor, offset) };
+  }));
+}
+
+// Each circle in turn at its cheapest place, then twice more around.
+function settled(order, anchors, places) {
+  const placed = {}, costs = {};
+  for (let round = 0; round < 3; round += 1) {
+    for (const k of order) {
+      costs[k] = Infinity;
+      for (const { offset, cost } of places[k]) {
+        if (cost >= costs[k]) continue;
+        const all = cost + costAmong(k, offset, anchors, placed);
+        if (all < costs[k]) { costs[k] = all; placed[k] = offset; }
       }
     }
   }
-  return placed;
+  return [order.reduce((sum, k) => sum + costs[k], 0), placed];
 }
 
-function labelCost(view, k, anchor, offset, anchors, placed) {
+function costAlone(view, anchor, offset) {
   const center = add(anchor, offset), reach = FINGER + 2;
   let cost = 0;
   for (const [dx, dy] of [[0, 0], [reach, 0], [-reach, 0], [0, reach], [0, -reach]]) {
@@ -207,10 +265,16 @@ function labelCost(view, k, anchor, offset, anchors, placed) {
     if (view.covers(at)) cost += 50;
     if (at[0] < 0 || at[1] < 0 || at[0] > view.width || at[1] > view.height) cost += 500;
   }
-  for (let part = 0.2; part < 0.9; part += 0.2) if (view.covers(add(anchor, offset, part))) cost += 15;
+  for (let part = 0.2; part < 0.9; part += 0.2) if (view.covers(add(anchor, offset, part))) cost += 40;
+  return cost;
+}
+
+function costAmong(k, offset, anchors, placed) {
+  const anchor = anchors[k], center = add(anchor, offset);
+  let cost = 0;
   for (const other of Object.keys(anchors)) {
     if (other === k) continue;
-    if (Math.hypot(center[0] - anchors[other][0], center[1] - anchors[other][1]) < reach + 4) cost += 300;
+    if (Math.hypot(center[0] - anchors[other][0], center[1] - anchors[other][1]) < FINGER + 6) cost += 300;
     if (!placed[other]) continue;
     const theirs = add(anchors[other], placed[other]);
     const apart = Math.hypot(center[0] - theirs[0], center[1] - theirs[1]) - 2 * FINGER - 3;
@@ -235,7 +299,8 @@ function meet(p, q, a, b) {
 
 // --- the picture ---
 
-let clips = 0;
+const FADE = 40;  // along the border of a picture, in pixels
+let fades = 0;
 
 // Draws a scene:
 //   contacts    finger -> [edge, fraction]
@@ -254,11 +319,9 @@ let clips = 0;
 function drawScene(svg, view, scene) {
   const { outline } = view, show = scene.show;
   const ring = `${outline.rings.map((points) => view.path(points)).join("Z")}Z`;
-  const clipId = `clip-${clips += 1}`;
-  const layer = [draw("clipPath", { id: clipId }, draw("path", { d: ring, "clip-rule": "evenodd" })),
-    draw("path", { class: "material", d: ring })];
+  const layer = [draw("path", { class: "material", d: ring })];
   if (show.cones && !(scene.support.length === 2 && scene.parallel)) {
-    layer.push(draw("g", { "clip-path": `url(#${clipId})` }, ...scene.support.map((k) => coneOf(view, scene, k))));
+    layer.push(...scene.support.map((k) => coneOf(view, scene, k)));
   }
   if (show.focus) layer.push(...focusOf(view, scene));
   layer.push(draw("path", { class: "outline", d: ring }));
@@ -283,12 +346,7 @@ function drawScene(svg, view, scene) {
 function coneOf(view, scene, k) {
   const [edge] = scene.contacts[k], apex = view.outline.at(scene.contacts[k]);
   const common = scene.parallel && scene.rays[k];
-  const [right, left] = common || view.outline.rays(edge);
-  // so far that the chord between the two rays is beyond the object
-  const middle = add(right, left), norm = Math.hypot(...middle);
-  const far = (ray) => 2 * view.outline.size * norm / (ray[0] * middle[0] + ray[1] * middle[1]);
-  const rim = [right, left].map((ray) => add(apex, ray, far(ray)));
-  return draw("path", { class: common ? "cone common" : "cone", d: `${view.path([apex, ...rim])}Z` });
+  return draw("path", { class: common ? "cone common" : "cone", d: `${view.path(visiblePart(view.outline, apex, common || view.outline.rays(edge)))}Z` });
 }
 
 function focusOf(view, scene) {
@@ -297,7 +355,19 @@ function focusOf(view, scene) {
   const points = focusRegions(parts.map((p) => ({ ...p, a: p.at, b: p.at })), view.box, true);
   const cell = scene.cell ? focusRegions(parts, view.box) : [];
   const shape = (polygons, name) => draw("path", { class: name, d: polygons.map((p) => `${view.path(p)}Z`).join("") });
-  return [shape(cell, "cell"), shape(points, "focus")];
+  const fade = `fade-${fades += 1}`;
+  return [...fadeMask(view, fade), draw("g", { mask: `url(#${fade})` }, shape(cell, "cell"), shape(points, "focus"))];
+}
+
+// What goes on beyond the picture fades towards its border.
+function fadeMask({ width, height }, id) {
+  const stop = (offset, opacity) => draw("stop", { offset, "stop-color": "#fff", "stop-opacity": opacity });
+  const ramp = (name, length, x2, y2) => draw("linearGradient", { id: `${id}-${name}`, x1: 0, y1: 0, x2, y2 },
+    stop(0, 0), stop(FADE / length, 1), stop(1 - FADE / length, 1), stop(1, 0));
+  const mask = (name, attributes) => draw("mask", { id: name, maskUnits: "userSpaceOnUse", x: 0, y: 0, width, height },
+    draw("rect", { width, height, ...attributes }));
+  return [ramp("x", width, 1, 0), ramp("y", height, 0, 1), mask(`${id}-rows`, { fill: `url(#${id}-y)` }),
+    mask(id, { fill: `url(#${id}-x)`, mask: `url(#${id}-rows)` })];
 }
 
 // The supporting contacts, whole edges and cones, as `focusRegions` takes them.
@@ -369,18 +439,48 @@ function edgeNumbers(view, scene, offsets) {
 
 // --- controls that pages share ---
 
-// Boxes to tick for the layers of the picture, with signs; `signs` are those without a box.
+// Boxes to tick for the layers of the picture, with signs, some with a second one; `signs` are
+// those without a box.
 function layerBoxes(layers, signs, show, changed) {
-  const boxes = layers.map(([name, sign, words]) => {
+  const signed = ([sign, words]) => [...(sign ? [make("span", { class: `sign ${sign}` })] : []), words];
+  const boxes = layers.map(([name, ...those]) => {
     const box = make("input", { type: "checkbox", id: `show-${name}` });
     box.checked = show[name];
     box.addEventListener("change", () => { show[name] = box.checked; changed(); });
-    return make("label", {}, box, ...(sign ? [make("span", { class: `sign ${sign}` })] : []), words);
+    return make("label", {}, box, ...signed(those), ...signed(those.slice(2)).filter(Boolean));
   });
-  const keys = signs.map(([sign, words]) => make("span", {}, make("span", { class: `sign ${sign}` }), words));
-  byId("layers").replaceChildren(...boxes, ...keys);
+  const keys = signs.map((one) => make("span", {}, ...signed(one)));
+  byId("layers").replaceChildren(...boxes, make("span", { class: "keys" }, ...keys));
+}
+
+// Windows in which a page is seen as a whole, and only its lists scroll; elsewhere the page does.
+const roomy = matchMedia("(min-width: 52.01rem) and (min-height: 40rem)");
+const seenWhole = () => roomy.matches && !byId("text").open;
+
+// The height that is left for an element if what follows in its section, up to `last`, is to be
+// seen without scrolling.
+function roomFor(element, last) {
+  const at = (one) => one.getBoundingClientRect();
+  const top = at(element).top + (seenWhole() ? 0 : scrollY), below = at(last).bottom - at(element).bottom;
+  return (seenWhole() ? at(element.closest("section")).bottom : innerHeight - 8) - top - below;
+}
+
+// Calls when the window has another width, or another height that matters: not when the bars of
+// a phone's browser come and go.
+function onResize(call) {
+  let [width, height] = [innerWidth, innerHeight];
+  addEventListener("resize", () => {
+    if (innerWidth === width && (innerHeight === height || !roomy.matches)) return;
+    [width, height] = [innerWidth, innerHeight];
+    call();
+  });
+  roomy.addEventListener("change", call);
 }
 
 // For print: what is folded away on the screen is on paper.
-addEventListener("beforeprint", () => { for (const one of document.querySelectorAll("details")) one.open = true; });
-addEventListener("afterprint", () => { for (const one of document.querySelectorAll("details")) one.open = false; });
+let unfolded = [];
+addEventListener("beforeprint", () => {
+  unfolded = [...document.querySelectorAll("details:not([open])")];
+  for (const one of unfolded) one.open = true;
+});
+addEventListener("afterprint", () => { for (const one of unfolded) one.open = false; });
