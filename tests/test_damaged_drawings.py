@@ -21,6 +21,7 @@ from regrasp_lp.outlines.curves import MOST_POINTS, Bezier, EllipticArc, polylin
 from regrasp_lp.outlines.drawing import MOST_PIECES, Expansion, Piece, Reading, outlines
 from regrasp_lp.outlines.svg_elements import parse_elements
 from regrasp_lp.outlines.svg_shapes import numbers_in
+from regrasp_lp.ring_checks import conflicts, first_conflict, nesting
 
 HEAD = '<svg xmlns="http://www.w3.org/2000/svg">'
 
@@ -311,3 +312,30 @@ def test_the_log_of_ezdxf_goes_where_somebody_wants_it(tmp_path: Path) -> None:
     before = list(log.handlers)
     read(tmp_path / "a.dxf", drawing(tmp_path))
     assert log.handlers == before
+
+
+# --- rings --------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("seed", range(20))
+def test_rings_are_compared_in_blocks_of_any_size(
+    seed: int, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    rng = np.random.default_rng(seed)
+    centers = rng.permutation(np.stack(np.meshgrid(range(4), range(4)), axis=-1).reshape(-1, 2))
+    turn = np.arange(9) * 2 * np.pi / 9
+    ring = np.column_stack([np.cos(turn), np.sin(turn)])
+    apart = [c + size * ring for c in centers for size in (0.1, 0.2, 0.4)]
+    mixed = [c + rng.uniform(0.2, 0.7) * ring for c in centers]
+    rounded = [np.round(r * 8) / 8 for r in mixed]  # with common points, and edges on one line
+    whole = [conflicts(apart), conflicts(mixed), conflicts(rounded)]
+    inside = nesting(apart)
+    assert whole[0] == []
+    assert inside.sum() == 3 * 16
+    assert min(map(len, whole[1:])) > 0
+    monkeypatch.setattr("regrasp_lp.ring_checks._ROWS", 1 + seed)
+    monkeypatch.setattr("regrasp_lp.ring_checks._BLOCK", 300 * (1 + seed))
+    assert [conflicts(apart), conflicts(mixed), conflicts(rounded)] == whole
+    assert (nesting(apart) == inside).all()
+    assert first_conflict(apart) is None
+    assert first_conflict(mixed) == whole[1][0]
