@@ -257,8 +257,7 @@ def test_where_nothing_slides_hops_do_no_better() -> None:
     """Repositioning without sliding is what a hand does whose fingers only are placed."""
     free, tied = graph_of(rl.Hand()), graph_of(rl.Hand(only_place=range(1, 5)))
     assert len(free) == len(tied)
-    start, goal = [(0, 30.0), (2, 30.0)], [(0, 20.0), (3, 20.0)]
-    goal = [(5, 20.0), (3, 20.0)]
+    start, goal = [(0, 30.0), (2, 30.0)], [(5, 20.0), (3, 20.0)]
     hops = free.plan(start, goal, aligning="regrip")
     plan = tied.plan(start, goal)
     obeys(plan, tied.hand)
@@ -284,6 +283,14 @@ def test_a_finger_that_only_slides_stays_from_start_to_goal() -> None:
         graph.plan(start, [(1, 1.5), (3, 1.5)])
     idle = graph.plan(rl.Grasp(start, fingers=[2, 3]), goal)
     assert all(1 not in held.contacts for held in idle.grasps)
+
+
+def test_three_fingers_that_only_slide_keep_to_their_set() -> None:
+    """More of them than a two-finger set has contacts."""
+    graph = graph_of(rl.Hand(only_slide=[1, 2, 3]), BLOCK, 0.4)
+    plan = graph.plan([(0, 1.0), (2, 4.5), (1, 1.0)], [(0, 5.0), (2, 1.5), (1, 1.5)])
+    obeys(plan, graph.hand)
+    assert all(isinstance(step, rl.Slide) for step in plan.steps)
 
 
 def test_objectives_state_their_bounds() -> None:

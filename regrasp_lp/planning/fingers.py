@@ -110,8 +110,10 @@ class Fingers:
             edges = family.functions.edges
             of_slid = np.isin(cones.group[edges], slid)
             same = of_slid.sum(axis=1) == len(needed)
-            mine = np.sort(np.where(of_slid, edges, np.iinfo(np.intp).max), axis=1)
-            parts.append(same & (mine[:, : len(needed)] == needed).all(axis=1))
+            if len(needed) <= family.functions.m:
+                mine = np.sort(np.where(of_slid, edges, np.iinfo(np.intp).max), axis=1)
+                same &= (mine[:, : len(needed)] == needed).all(axis=1)
+            parts.append(same)
         return np.concatenate(parts)
 
     def free(self, touching: Iterable[int], group: int | None = None) -> int:

@@ -29,14 +29,14 @@ from regrasp_lp.planning.path_lp import (
 )
 
 _MOST_SLIDES = 3
-"""In one set, from one piece to another: what no plan was found to need more of."""
+"""In one set, from one piece to another: the program grows with their number."""
 
 _SECONDS = 5.0
 _GAP = 0.05
-"""Part of the best margin that may be missed."""
+"""Part of the best tolerance that may be missed."""
 
 _POSITIVE = 1e-9
-"""Of the object's size: a margin that is more than rounding."""
+"""Of the object's size: a tolerance that is more than rounding."""
 
 
 def choose_pieces(
