@@ -68,6 +68,7 @@ napoleon_use_ivar = True
 napoleon_use_admonition_for_notes = False
 
 html_math_renderer = "mathml"
+smartquotes = False  # commands are pasted
 html_theme = "furo"
 html_title = f"regrasp_lp {release}"
 html_static_path = ["static"]
